@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import core
+from benchmarks.ablation import constants
 
 ROOT = Path(__file__).parents[2]
 PUBLIC = [
@@ -199,6 +200,11 @@ def test_core_needs_numpy_and_scipy_only():
         if not name.startswith(".") and name.split(".")[0] not in allowed and (file.name, name) not in las
     ]
     assert wrong == []
+
+
+def test_few_numbers_between_points_and_matrix_are_chosen():
+    """Each must have a case that it guards: docs/ablation.md."""
+    assert sum(1 for _ in constants()) <= 40
 
 
 def test_public_names_are_what_their_modules_hold():
