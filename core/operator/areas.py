@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.special import expit
 
 from ..algebra import chebyshev_terms, on_all_cores
-from ..geometry import CURVED, ROUNDS, arc_length, read_cloud
+from ..geometry import ROUNDS, arc_length, read_cloud
 from ..kernel import kernel
 from ..options import LaplacianOptions
 from ..types import Bools, Floats, Report
@@ -21,6 +21,7 @@ from .images import mirror, own_images
 if TYPE_CHECKING:
     from ..geometry import Boundary, Cloud, Pairs, Patch
 
+_FLOOR = 0.5  # least area in units of that of the Voronoi cell: all stay positive
 _DEGREE = 100  # of the polynomial of the first round; half of it of the second, for what the floor changed in the first
 _EVEN = 1e-9  # changes of h, as a share, that are rounding
 _MANY = 1 << 20  # pairs from which a product takes longer than to start threads
@@ -166,12 +167,12 @@ def fast_areas(matrix: KernelMatrix, target: Floats, cells: Floats) -> Floats:
     """Solve A v = b by two projected rounds of polynomials in A, from the areas c of the Voronoi cells.
 
     M = V0^(1/2) A V0^(1/2) with v0 = c / (A c) has its eigenvalues in [-1, 1]; but for pairs left out between close
-    sheets, images in boundaries and noise they would be positive. Each round adds p(M) times the residual to y in M y =
-    V0^(1/2) b, v = V0^(1/2) y, where p(x) is close to 1 / x down to a least eigenvalue, and about zero below it: the
-    smooth part is solved for, and details that the kernel does not resolve stay near the cells. In between, areas below
-    the floor, less than the cells' by what curvature may change at most, are set to it, held there, and released when
-    the gradient points inward. A fixed number of linear steps, unlike conjugate gradients, does not amplify rounding:
-    the result is the same to 1e-10 for any order of the points.
+    sheets, images in boundaries and noise they would be positive. Each round adds p(M) times the residual to y in
+    M y = V0^(1/2) b, v = V0^(1/2) y, where p(x) is close to 1 / x down to a least eigenvalue, and about zero below it:
+    the smooth part is solved for, and details that the kernel does not resolve stay near the cells. In between, areas
+    below the floor of c / 2 are set to it, held there, and released when the gradient points inward. A fixed number of
+    linear steps, unlike conjugate gradients, does not amplify rounding: the result is the same to 1e-10 for any order
+    of the points.
 
     Parameters
     ----------
@@ -189,7 +190,7 @@ def fast_areas(matrix: KernelMatrix, target: Floats, cells: Floats) -> Floats:
     """
     root = np.sqrt(cells / (matrix @ cells))
     right, y = root * target, cells / root
-    floor = (1.0 - CURVED) * y
+    floor = _FLOOR * y
     held = np.zeros(len(target), dtype=bool)
     for degree in (_DEGREE, _DEGREE // 2):
         residual = right - root * (matrix @ (root * y))
