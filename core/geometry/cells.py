@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 _BLOCK = 1 << 12
 _SAME = 1e-9  # share of the longest cut, or of their product, by which two that differ are one
-_OPEN = 1.0  # spacings from a point at which its cell ends where it has no neighbour: as far as those of random points
 _AT_BOUNDARY = 1e-3  # spacings that a boundary lies off a point, at least
 _CLOSEST = 1e-6  # spacings that a cut lies off its point, at least: by `_SAME`, a longer one hides the others
 
@@ -95,8 +94,9 @@ def measure_cells(
             areas, radius, closed = _intersect(cuts, gaussian_curvature[block], 0.5 * furthest)
             known = np.flatnonzero(closed)
             if many == COUNT and not closed.all():
+                # Where a cell has no neighbour it ends one spacing off, as far as those of random points.
                 gaps = np.flatnonzero(~closed)
-                capped = np.concatenate([cuts[gaps], _caps(cuts[gaps], 1.0 / (_OPEN * spacing[block[gaps]]))], axis=1)
+                capped = np.concatenate([cuts[gaps], _caps(cuts[gaps], 1.0 / spacing[block[gaps]])], axis=1)
                 areas[gaps], radius[gaps], _ = _intersect(capped, gaussian_curvature[block[gaps]], np.inf)
                 known = np.arange(len(block))
             cells.areas[block[known]], cells.radius[block[known]] = areas[known], radius[known]
