@@ -51,6 +51,7 @@ from .applications.profile import profile as profile
 from .applications.reaction import Mixture as Mixture
 from .applications.reaction import ReactionDiffusion as ReactionDiffusion
 from .applications.regions import Region as Region
+from .applications.regions import SurfaceMeasures as SurfaceMeasures
 from .applications.regions import measure_region as measure_region
 from .applications.sections import CrossSection as CrossSection
 from .applications.sections import SectionCurve as SectionCurve

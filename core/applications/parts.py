@@ -13,8 +13,7 @@ from ..errors import InvalidPointsError
 from ..geometry import as_mask
 from ..operator import LaplaceBeltrami
 from ..types import Bools, Floats, Ints, Progress
-from .graph import mean_spacing
-from .regions import LENGTH_OFF, STRIP, area_doubts, boundary_lengths, measure_region
+from .regions import LENGTH_OFF, STRIP, SurfaceMeasures, measure_region
 
 _NEAR = 7  # nearest points, the point itself among them, of which one is beyond the rim
 
@@ -94,15 +93,14 @@ def measure_parts(
     """
     report = progress or (lambda stage, fraction: None)
     parts = _Labelled(laplacian, labels)
-    spacing = mean_spacing(laplacian)
-    own = boundary_lengths(laplacian.areas, laplacian.boundary_distance, spacing)
-    areas, lengths = parts.sums(laplacian.areas), parts.sums(own)
-    doubt = parts.sums(area_doubts(laplacian, spacing)) + STRIP * np.abs(parts.sums(spacing * own))
+    whole = SurfaceMeasures(laplacian)
+    areas, lengths = parts.sums(whole.areas), parts.sums(whole.boundary_lengths)
+    doubt = parts.sums(whole.area_doubts) + STRIP * np.abs(parts.sums(whole.spacing * whole.boundary_lengths))
     doubt_of_lengths = LENGTH_OFF[1] * np.abs(lengths)
     divided = np.flatnonzero(parts.divided())
     for done, part in enumerate(divided):
         report("Parts", done / len(divided))
-        region = measure_region(laplacian, parts.members(part))
+        region = measure_region(laplacian, parts.members(part), measures=whole)
         areas[part], lengths[part] = region.area, region.boundary_length
         doubt[part] = region.area_uncertainty
         doubt_of_lengths[part] = region.length_uncertainty

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy import sparse
 from scipy.spatial import cKDTree
 from scipy.special import erfinv, expit
 
@@ -20,6 +21,7 @@ from ..types import Bools, Floats, Ints, Progress
 from .graph import mean_spacing
 
 _SPREAD = 2.0  # spacings over which the step between members and others is smoothed first
+_FAR = 10.0  # spacings from the line beyond which that changes nothing, and nothing else asks for the distance
 _STRIP = 2.0  # spacings from the line between them within which points tell where it is
 _WINDOWS = 4.0, 9.0  # spacings along the line over which a parabola is fitted: at first, and at most
 _TURN = 0.7  # radii of the line's curvature within which a parabola is close to it
@@ -27,10 +29,12 @@ _SHORTEST = 3.0  # spacings of such a window at least
 _BLUR = 0.2  # spacings over which the chance to be a member falls, in the fit
 _PRIOR = np.array([1e-3, 0.05, 1.0])  # how much the fit resists an offset, a slope and a curvature
 _LARGEST = np.array([1.0, 1.0, 0.5])  # change of each in a step, and in all
-_ROUNDS = 8  # of Newton's iteration
+_ROUNDS = 8  # of Newton's iteration at most
+_DONE = 1e-3  # of the largest change: it ends with smaller ones
 _WIDE = 4.0  # spacings on both sides of the line over which areas are summed to its length
 _NARROW = 3.0  # spacings from the boundary of the surface over which areas are summed to its length, and twice that
 _THIN = 0.7  # of the depth of a thin part that may be taken for that
+_DEEP = 8.0  # spacings from the line within which distances are measured, more than those over the last number
 _TURNS = 0.06, 0.09  # by which the line turns along a spacing, until plain sums are nearer to the area
 _VARIANCE = 1.0 / 7.0  # of the derivative of the step
 _MOMENTS = 0.1  # share of an area that may be wrong where trust is a half
@@ -39,6 +43,8 @@ _ROUNDED = 6.0  # of noise times spacing times the squared mean curvature: what 
 STRIP = 0.2  # of the spacing, along the boundary of the surface: where that is
 _AREA_OFF = 1.0  # of the area of a square of one spacing: what each such piece of the line leaves open, two deviations
 LENGTH_OFF = 0.01, 0.05  # of the length of the line, and of the boundary of the surface
+_UPPER = np.triu_indices(3)  # entries of a symmetric matrix that tell all
+_MIRRORED = np.array([0, 1, 2, 1, 3, 4, 2, 4, 5])  # where each entry is among these
 _NEAREST = 24  # pieces of the line by which the distance of a point is measured
 _PARALLEL = 0.3  # cosine between the directions across the line at two points, at least, if it is one line
 _STEEP = 1.5  # length of a chord over that in the tangent plane, at most, on one sheet
@@ -71,7 +77,107 @@ class Region:
     length_uncertainty: float
 
 
-def measure_region(laplacian: LaplaceBeltrami, members: ArrayLike, *, progress: Progress | None = None) -> Region:
+class SurfaceMeasures:
+    """What the measures of all parts of a surface have in common, made once and kept for many parts.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+        Of n points.
+
+    Attributes
+    ----------
+    areas : ndarray, (n,)
+        Area elements, zero for points left out [L^2].
+    spacing : ndarray, (n,)
+        Distance between points [L].
+    area_doubts : ndarray, (n,)
+        By how much the area of each point may be wrong [L^2].
+    boundary_lengths : ndarray, (n,)
+        Length of the surface's own boundary next to each point [L].
+
+    See Also
+    --------
+    measure_region : Measures one part.
+
+    Examples
+    --------
+    Both halves of the unit sphere have the area 2 pi:
+
+    >>> import numpy as np
+    >>> import core
+    >>> points = core.example_sphere()
+    >>> laplacian = core.build_laplacian(points)
+    >>> measures = core.SurfaceMeasures(laplacian)
+    >>> halves = [core.measure_region(laplacian, side * points[:, 2] > 0, measures=measures) for side in (1, -1)]
+    >>> print([round(half.area / np.pi, 1) for half in halves])
+    [2.0, 2.0]
+    """
+
+    def __init__(self, laplacian: LaplaceBeltrami) -> None:
+        known = laplacian.component >= 0
+        self.laplacian = laplacian
+        self.areas = np.where(known, laplacian.areas, 0.0)
+        self.spacing = mean_spacing(laplacian)
+        self.area_doubts = _area_doubts(laplacian, self.spacing)
+        self.boundary_lengths = _boundary_lengths(self.areas, laplacian.boundary_distance, self.spacing)
+        # The heat of a point flows to its neighbours at twice this rate at most.
+        self.rates = np.where(known, laplacian.stiffness.diagonal() / laplacian.areas, 0.0)
+        self._places = laplacian.surface_points - laplacian.surface_points[known].mean(axis=0)
+        self._reach = float(np.sqrt(laplacian.stiffness.nnz / len(known) / np.pi))  # spacings to the furthest neighbour
+
+    def around(self, members: Bools) -> Ints:
+        """Return all points within some spacings of the line between members and others, (r,) int."""
+        few = members if 2 * np.count_nonzero(members) <= len(members) else ~members
+        across = self._neighbors(np.flatnonzero(few)) & ~few
+        result = new = across | (self._neighbors(np.flatnonzero(across)) & few)
+        for _ in range(int(np.ceil(_FAR / self._reach)) - 1):
+            new = self._neighbors(np.flatnonzero(new)) & ~result
+            result = result | new
+        return np.flatnonzero(result)
+
+    def _neighbors(self, rows: Ints) -> Bools:
+        """Return which points the operator couples with some, (n,)."""
+        result = np.zeros(len(self.areas), dtype=bool)
+        result[self.laplacian.stiffness[rows].indices] = True
+        return result
+
+    def smoothed(self, members: Bools, near: Ints) -> tuple[Ints, Floats, Floats]:
+        """Smooth the step between members and others by heat flow, near the line between them.
+
+        Returns
+        -------
+        rows : ndarray, (r,) int
+            Points so close to the line that they tell where it is.
+        level : ndarray, (r,)
+            About their distance from the line, positive at members [L].
+        rise : ndarray, (r, 3)
+            Unit tangents towards members.
+        """
+        pairs, areas = self.laplacian.stiffness[near], self.laplacian.areas[near]
+        time = 0.5 * (_SPREAD * float(np.median(self.spacing[near]))) ** 2 if len(near) else 0.0
+        steps = int(np.ceil(1.5 * time * self.rates[near].max(initial=0.0)))
+        values = np.where(members, 1.0, -1.0)
+        for _ in range(steps):
+            values[near] -= time / steps * (pairs @ values / areas)
+        level = 2.0 * np.sqrt(time) * erfinv(np.clip(values[near], -_SURE, _SURE))
+        close = np.abs(level) < _STRIP * self.spacing[near]
+        rows, places = near[close], self._places
+        own, at = values[rows, None], places[rows]
+        products = pairs[close] @ np.column_stack([places, values[:, None] * places, values])
+        rise = own * products[:, :3] - products[:, 3:6] + at * products[:, 6:]  # twice the areas too long
+        normals = self.laplacian.normals[rows]
+        rise -= np.einsum("nc,nc->n", rise, normals)[:, None] * normals
+        return rows, level[close], rise / np.maximum(np.linalg.norm(rise, axis=1), 1e-300)[:, None]
+
+
+def measure_region(
+    laplacian: LaplaceBeltrami,
+    members: ArrayLike,
+    *,
+    measures: SurfaceMeasures | None = None,
+    progress: Progress | None = None,
+) -> Region:
     """Measure the area of a part of the surface, the length of its boundary, and its centroid.
 
     Parameters
@@ -80,6 +186,8 @@ def measure_region(laplacian: LaplaceBeltrami, members: ArrayLike, *, progress: 
         Of n points.
     members : array_like, (n,) bool, (k,) int or (n,) float
         The points of the part, or the share of each, from 0 to 1, that belongs to it.
+    measures : SurfaceMeasures, optional
+        Of the same operator, kept for many parts: what does not depend on the part.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
@@ -120,23 +228,27 @@ def measure_region(laplacian: LaplaceBeltrami, members: ArrayLike, *, progress: 
     """
     report = progress or (lambda stage, fraction: None)
     share = _shares(laplacian, members)
-    known, spacing = laplacian.component >= 0, mean_spacing(laplacian)
+    whole = measures or SurfaceMeasures(laplacian)
     report("Line", 0.0)
-    line = _find_line(laplacian, share > 0.5, spacing, lambda done: report("Line", done))
+    near, line = _find_line(whole, share > 0.5, lambda done: report("Line", done))
     report("Areas", 0.9)
-    areas = np.where(known, laplacian.areas, 0.0)
-    inside, width = _from_line(laplacian, line, share > 0.5, spacing)
-    step, second = _step(inside / width), float(areas @ (_second(inside / width) / width**2))
-    length = float(areas @ (_slope(inside / width) / width))
-    plain, smooth = float(areas @ share), float(areas @ step - 0.5 * _VARIANCE * (areas @ _second(inside / width)))
+    areas, spacing = whole.areas, whole.spacing
+    inside, width = _from_line(whole, near, line, share > 0.5)
+    ratio = inside[near] / width[near]
+    slope, second = _slope(ratio) / width[near], _second(ratio) / width[near] ** 2
+    step = np.where(inside > 0.0, 1.0, 0.0)
+    step[near] = _step(ratio)
+    length, turns = float(areas[near] @ slope), float(areas[near] @ second)
+    bent = float(areas[near] @ _second(ratio))
+    plain, smooth = float(areas @ share), float(areas @ step - 0.5 * _VARIANCE * bent)
     # Where the line turns within a few spacings, the parabolas are off by more than the cells.
-    turn = abs(second) / max(length, 1e-300) * float(np.median(spacing))
+    turn = abs(turns) / max(length, 1e-300) * float(np.median(spacing[near])) if len(near) else 0.0
     fine = np.clip((_TURNS[1] - turn) / (_TURNS[1] - _TURNS[0]), 0.0, 1.0) if np.all(share % 1.0 == 0.0) else 0.0
     area = fine * smooth + (1.0 - fine) * plain
-    owned = boundary_lengths(areas * step, laplacian.boundary_distance, spacing)
-    own, doubt = float(owned.sum()), float(share @ area_doubts(laplacian, spacing) + STRIP * abs(spacing @ owned))
+    owned = whole.boundary_lengths * step
+    own, doubt = float(owned.sum()), float(share @ whole.area_doubts + STRIP * abs(spacing @ owned))
     weight = areas * (fine * step + (1.0 - fine) * share)
-    squared = areas @ (_slope(inside / width) / width * spacing**3)
+    squared = areas[near] @ (slope * spacing[near] ** 3)
     return Region(
         area=area,
         boundary_length=length + own,
@@ -146,7 +258,7 @@ def measure_region(laplacian: LaplaceBeltrami, members: ArrayLike, *, progress: 
     )
 
 
-def area_doubts(laplacian: LaplaceBeltrami, spacing: Floats) -> Floats:
+def _area_doubts(laplacian: LaplaceBeltrami, spacing: Floats) -> Floats:
     """Return by how much the area of each point may be wrong, (n,): by missed moments, and by noise."""
     missed = _MOMENTS * np.sqrt(1.0 / np.maximum(laplacian.trust, 1e-6) - 1.0)
     noise = np.linalg.norm(laplacian.surface_points - laplacian.points, axis=1)
@@ -177,15 +289,15 @@ def _shares(laplacian: LaplaceBeltrami, members: ArrayLike) -> Floats:
     return result
 
 
-def _from_line(laplacian: LaplaceBeltrami, line: _Line, members: Bools, spacing: Floats) -> tuple[Floats, Floats]:
+def _from_line(whole: SurfaceMeasures, near: Ints, line: _Line, members: Bools) -> tuple[Floats, Floats]:
     """Return the distance of each point from the line, positive at members, and the width to sum over, (n,) each."""
     far = np.where(members, np.inf, -np.inf)
     if not len(line.feet):
-        return far, _WIDE * spacing
-    rows, signed, width = line.distances(laplacian)
-    inside, used = far, spacing.copy()
+        return far, _WIDE * whole.spacing
+    rows, signed, width = line.distances(whole.laplacian, near)
+    inside, used = far, whole.spacing.copy()
     inside[rows], used[rows] = signed, width
-    deep = np.where(np.isin(laplacian.component, line.component), inside / used, 0.0)
+    deep = np.where(np.isin(whole.laplacian.component, line.component), inside / used, 0.0)
     thin = min(float(deep[members].max(initial=0.0)), float(-deep[~members].min(initial=0.0)))
     return inside, used * min(_WIDE, max(_THIN * thin, 1.0))
 
@@ -212,7 +324,7 @@ def _edge(x: Floats) -> Floats:
     return 2.0 * _slope(np.maximum(x, 0.0))
 
 
-def boundary_lengths(areas: Floats, distance: Floats, spacing: Floats) -> Floats:
+def _boundary_lengths(areas: Floats, distance: Floats, spacing: Floats) -> Floats:
     """Return the length of the surface's boundary next to each point, (n,), summed over a strip along it.
 
     It is that of areas within two distances from the boundary, extrapolated to none, so that single ones may be below
@@ -246,8 +358,8 @@ class _Line(NamedTuple):
     spacing: Floats
     component: Ints
 
-    def distances(self, laplacian: LaplaceBeltrami) -> tuple[Ints, Floats, Floats]:
-        """Measure the points near the line, on its sheet.
+    def distances(self, laplacian: LaplaceBeltrami, rows: Ints) -> tuple[Ints, Floats, Floats]:
+        """Measure points near the line, those of some rows that are on its sheet.
 
         Returns
         -------
@@ -257,17 +369,16 @@ class _Line(NamedTuple):
         spacing : ndarray, (r,)
             At the line.
         """
-        count = len(laplacian.points)
-        places = np.concatenate([laplacian.surface_points, self.feet])
-        apart = move_apart(places, np.concatenate([laplacian.component, self.component]))
-        tree = cKDTree(apart[count:])
-        reach = 2.0 * _WIDE * float(self.spacing.max())
-        rows = np.flatnonzero(np.isfinite(tree.query(apart[:count], distance_upper_bound=reach, workers=-1)[0]))
-        near = tree.query(apart[rows], k=np.arange(1, min(_NEAREST, len(self.feet)) + 1), workers=-1)[1]
+        places = np.concatenate([laplacian.surface_points[rows], self.feet])
+        apart = move_apart(places, np.concatenate([laplacian.component[rows], self.component]))
+        tree, reach = cKDTree(apart[len(rows) :]), _DEEP * float(self.spacing.max())
+        close = np.isfinite(tree.query(apart[: len(rows)], distance_upper_bound=reach)[0])
+        apart, rows = apart[: len(rows)][close], rows[close]
+        near = tree.query(apart, k=np.arange(1, min(_NEAREST, len(self.feet)) + 1))[1]
         offset = laplacian.surface_points[rows, None] - self.feet[near]
         across = np.einsum("nkc,nkc->nk", offset, self.inward[near])
-        along = np.einsum("nkc,nkc->nk", offset, np.cross(self.normals[near], self.inward[near]))
-        length = np.linalg.norm(offset, axis=2)
+        along = np.einsum("nkc,nkc->nk", offset, np.cross(self.normals, self.inward)[near])
+        length = np.sqrt(np.einsum("nkc,nkc->nk", offset, offset))
         stretch = length / np.maximum(np.hypot(across, along), 1e-300)
         signed = stretch * across - 0.5 * self.bend[near] * along**2
         facing = np.einsum("nkc,nc->nk", self.normals[near], laplacian.normals[rows]) > SMOOTH
@@ -277,46 +388,24 @@ class _Line(NamedTuple):
         total = weight.sum(axis=1)
         weight /= np.maximum(total, 1e-300)[:, None]
         mean = np.einsum("nk,nk->n", weight, signed), np.einsum("nk,nk->n", weight, self.spacing[near])
-        known = (total > _LEAST) & (np.abs(mean[0]) < 2.0 * _WIDE * mean[1])
+        known = (total > _LEAST) & (np.abs(mean[0]) < _DEEP * mean[1])
         return rows[known], mean[0][known], mean[1][known]
 
 
-def _find_line(laplacian: LaplaceBeltrami, members: Bools, spacing: Floats, report: Callable[[float], None]) -> _Line:
-    """Find the line between members and others; it has no pieces where there are none of both on a component."""
-    level, rise = _smoothed(laplacian, members, float(np.median(spacing)))
-    rows = np.flatnonzero((np.abs(level) < _STRIP * spacing) & (laplacian.component >= 0))
-    report(0.3)
-    strip = _Strip(laplacian, rows, members, level, rise, spacing)
-    fit = strip.fitted(np.full(len(rows), _WINDOWS[0]))
-    report(0.6)
-    window = np.clip(_TURN / np.maximum(np.abs(fit[:, 2]), 1e-12), _SHORTEST, _WINDOWS[1])
-    return strip.line(strip.fitted(window))
-
-
-def _smoothed(laplacian: LaplaceBeltrami, members: Bools, spacing: float) -> tuple[Floats, Floats]:
-    """Smooth the step between members and others by heat flow.
+def _find_line(whole: SurfaceMeasures, members: Bools, report: Callable[[float], None]) -> tuple[Ints, _Line]:
+    """Find the line between members and others; it has no pieces where there are none of both on a component.
 
     Returns
     -------
-    level : ndarray, (n,)
-        About the distance from the step, positive at members [L].
-    rise : ndarray, (n, 3)
-        Unit tangents towards members.
+    near : ndarray, (r,) int
+        All points near it.
+    line : _Line
     """
-    stiffness, areas = laplacian.stiffness, laplacian.areas
-    time = 0.5 * (_SPREAD * spacing) ** 2
-    known = laplacian.component >= 0
-    fastest = 2.0 * float(np.max(stiffness.diagonal()[known] / areas[known]))
-    steps = int(np.ceil(time * fastest * 0.75))
-    values = np.where(members, 1.0, -1.0)
-    for _ in range(steps):
-        values = values - time / steps * np.where(known, stiffness @ values / areas, 0.0)
-    places = laplacian.surface_points - laplacian.surface_points[known].mean(axis=0)
-    products = stiffness @ np.column_stack([places, values[:, None] * places, values])
-    rise = values[:, None] * products[:, :3] - products[:, 3:6] + places * products[:, 6:]  # twice the areas too long
-    rise -= np.einsum("nc,nc->n", rise, laplacian.normals)[:, None] * laplacian.normals
-    level = 2.0 * np.sqrt(time) * erfinv(np.clip(values, -_SURE, _SURE))
-    return level, rise / np.maximum(np.linalg.norm(rise, axis=1), 1e-300)[:, None]
+    near = whole.around(members)
+    rows, level, rise = whole.smoothed(members, near)
+    report(0.3)
+    strip = _Strip(whole, rows, members, level, rise)
+    return near, strip.line(strip.fitted())
 
 
 class _Strip:
@@ -326,44 +415,47 @@ class _Strip:
     n across the line to the members and t along it.
     """
 
-    def __init__(
-        self, laplacian: LaplaceBeltrami, rows: Ints, members: Bools, level: Floats, rise: Floats, spacing: Floats
-    ) -> None:
+    def __init__(self, whole: SurfaceMeasures, rows: Ints, members: Bools, level: Floats, rise: Floats) -> None:
+        laplacian, spacing = whole.laplacian, whole.spacing[rows]
         self._points, self._normals = laplacian.surface_points[rows], laplacian.normals[rows]
-        self._component, self._spacing = laplacian.component[rows], spacing[rows]
+        self._component, self._spacing = laplacian.component[rows], spacing
         self._sign = np.where(members[rows], 1.0, -1.0)
-        self._rise, self._start = rise[rows], level[rows] / spacing[rows]
+        self._rise, self._start = rise, level / spacing
         self._along = np.cross(self._normals, self._rise)
 
-    def fitted(self, window: Floats) -> Floats:
-        """Return the three coefficients of the most likely parabola in a window of each point, (m, 3)."""
-        result = np.zeros((len(window), 3))
-        if not len(window):
+    def fitted(self) -> Floats:
+        """Return the three coefficients of the most likely parabola around each point, (m, 3)."""
+        result = np.zeros((len(self._start), 3))
+        if not len(result):
             return result
         apart = move_apart(self._points, self._component)
         tree = cKDTree(apart)
-        reach = np.hypot(window, 2.0 * _STRIP) * self._spacing
-        for rows in blocks(len(window), _BLOCK):
+        reach = np.hypot(_WINDOWS[1], 2.0 * _STRIP) * self._spacing
+        for rows in blocks(len(result), _BLOCK):
             found = tree.query_ball_point(apart[rows], reach[rows], return_sorted=False)
             row = np.repeat(np.arange(len(found)), [len(near) for near in found])
-            result[rows] = self._fit(rows, row, np.concatenate(found).astype(np.int64), window[rows])
+            result[rows] = self._fit(rows, row, np.concatenate(found).astype(np.int64))
         return result
 
-    def _fit(self, rows: slice, row: Ints, other: Ints, window: Floats) -> Floats:
-        """Fit parabolas around some points, by pairs of their number among these and another point."""
+    def _fit(self, rows: slice, row: Ints, other: Ints) -> Floats:
+        """Fit parabolas around some points, by pairs of their number among these, ascending, and another point.
+
+        The window is as long as a parabola is close to the line, by a first one in a short window.
+        """
         frame = np.stack([self._along[rows], self._rise[rows], self._normals[rows]], axis=1)
         offset = (self._points[other] - self._points[rows][row]) / self._spacing[rows][row, None]
         t, n, _ = np.einsum("pac,pc->ap", frame[row], offset)
         same = np.einsum("pc,pc->p", self._normals[other], frame[row, 2]) > SMOOTH
         same &= np.einsum("pc,pc->p", self._rise[other], frame[row, 1]) > _PARALLEL
-        same &= np.abs(t) < window[row]
-        row, other, t, n = row[same], other[same], t[same], n[same]
-        weight = (1.0 - (t / window[row]) ** 2) ** 2
-        terms = np.stack([np.ones_like(t), t, 0.5 * t * t], axis=1)
-        found = np.zeros((len(window), 3))
-        found[:, 0] = self._start[rows]
-        for _ in range(_ROUNDS):
-            found = found - _newton(found, row, weight, terms, n, self._sign[other])
+        begin = np.column_stack([self._start[rows], np.zeros((len(frame), 2))])
+        window = np.full(len(frame), _WINDOWS[0])
+        for _ in range(2):
+            kept = np.flatnonzero(same & (np.abs(t) < window[row]))
+            there = row[kept]
+            weight = (1.0 - (t[kept] / window[there]) ** 2) ** 2
+            likelihood = _Likelihood(there, len(frame), weight, t[kept], n[kept], self._sign[other[kept]])
+            found = likelihood.largest(begin)
+            window = np.clip(_TURN / np.maximum(np.abs(found[:, 2]), 1e-12), _SHORTEST, _WINDOWS[1])
         return found
 
     def line(self, found: Floats) -> _Line:
@@ -379,16 +471,58 @@ class _Strip:
         return _Line(*(piece[sound] for piece in pieces))
 
 
-def _newton(found: Floats, row: Ints, weight: Floats, terms: Floats, across: Floats, sign: Floats) -> Floats:
-    """Return a step of Newton's method for logistic regression, (m, 3)."""
-    count = len(found)
-    miss = expit(-sign * (np.einsum("pa,pa->p", terms, found[row]) + across) / _BLUR)
-    slope = -weight * sign * miss / _BLUR
-    curve = weight * miss * (1.0 - miss) / _BLUR**2
-    first = [np.bincount(row, slope * term, count) for term in terms.T]
-    gradient = np.array(first, dtype=np.float64).T + np.append(0.0, _PRIOR[1:]) * found
-    second = [[np.bincount(row, curve * a * b, count) for a in terms.T] for b in terms.T]
-    hessian = np.moveaxis(np.array(second, dtype=np.float64), 2, 0) + np.diag(_PRIOR)
-    step: Floats = np.linalg.solve(hessian, gradient[:, :, None])[:, :, 0]
-    result: Floats = step / np.maximum(np.abs(step / _LARGEST).max(axis=1, keepdims=True), 1.0)
-    return result
+class _Likelihood:
+    """How likely parabolas are, by pairs of a parabola, in ascending order, and a point that is a member or not.
+
+    Parameters
+    ----------
+    row : ndarray, (p,) int
+        Of the parabola.
+    count : int
+        How many there are.
+    weight : ndarray, (p,)
+    t, n : ndarray, (p,)
+        Where the point is, along the line and across it.
+    sign : ndarray, (p,)
+        1 for members, -1 for others.
+    """
+
+    def __init__(self, row: Ints, count: int, weight: Floats, t: Floats, n: Floats, sign: Floats) -> None:
+        self._pairs = row, weight, t, n, sign
+        self._terms = np.stack([np.ones_like(t), t, 0.5 * t * t], axis=1)
+        self._first = weight[:, None] * self._terms
+        self._second = self._first[:, _UPPER[0]] * self._terms[:, _UPPER[1]]
+        ends = np.searchsorted(row, np.arange(count + 1))
+        self._sums = sparse.csr_array((sign, np.arange(len(row)), ends), shape=(count, len(row)))
+
+    def largest(self, found: Floats) -> Floats:
+        """Return the coefficients of the most likely parabolas, (m, 3), by Newton's method from others."""
+        found, part, rows = found.copy(), self, np.arange(len(found))
+        for _ in range(_ROUNDS):
+            step = part._newton(found[rows])
+            found[rows] -= step
+            left = np.abs(step / _LARGEST).max(axis=1) > _DONE
+            if not left.any():
+                break
+            if 2 * np.count_nonzero(left) <= len(left):
+                part, rows = part._of(left), rows[left]
+        return found
+
+    def _of(self, chosen: Bools) -> _Likelihood:
+        """Return the same of some parabolas only."""
+        row, *others = self._pairs
+        kept = chosen[row]
+        number = np.cumsum(chosen) - 1
+        return _Likelihood(number[row[kept]], int(np.count_nonzero(chosen)), *(values[kept] for values in others))
+
+    def _newton(self, found: Floats) -> Floats:
+        row, _, _, n, sign = self._pairs
+        value = n + np.einsum("pa,pa->p", self._terms, found[row])
+        miss = expit(-sign * value / _BLUR)
+        self._sums.data = sign * miss / _BLUR
+        gradient = np.append(0.0, _PRIOR[1:]) * found - self._sums @ self._first
+        self._sums.data = miss * (1.0 - miss) / _BLUR**2
+        hessian = (self._sums @ self._second)[:, _MIRRORED].reshape(-1, 3, 3) + np.diag(_PRIOR)
+        step: Floats = np.linalg.solve(hessian, gradient[:, :, None])[:, :, 0]
+        result: Floats = step / np.maximum(np.abs(step / _LARGEST).max(axis=1, keepdims=True), 1.0)
+        return result
