@@ -40,12 +40,12 @@ from .applications.motion import Heat as Heat
 from .applications.motion import Wave as Wave
 from .applications.motion import WaveState as WaveState
 from .applications.parts import Parts as Parts
-from .applications.parts import Pile as Pile
 from .applications.parts import measure_parts as measure_parts
 from .applications.parts import part_means as part_means
-from .applications.parts import pile_volume as pile_volume
 from .applications.paths import geodesic_path as geodesic_path
 from .applications.paths import polygon_length as polygon_length
+from .applications.piles import Pile as Pile
+from .applications.piles import pile_volume as pile_volume
 from .applications.profile import Profile as Profile
 from .applications.profile import profile as profile
 from .applications.reaction import Mixture as Mixture

@@ -150,3 +150,17 @@ def check_positions(positions: ArrayLike, count: int, name: str, singular: str) 
     given = as_doubles(check_array(positions, name.capitalize(), [(count, 3)], wanted))
     check_finite(given, name, f"Give a position for each {singular}.", _HUGE)
     return given
+
+
+def check_plane(point: ArrayLike, normal: ArrayLike) -> tuple[Floats, Floats]:
+    """Return a point of the plane and its unit normal, or say what is wrong with them."""
+    found = []
+    for given, name in ((point, "point"), (normal, "normal")):
+        array = check_array(given, f"Coordinates of the {name} of the plane", [(3,)], "Give three real numbers.")
+        found.append(as_doubles(array))
+        check_finite(found[-1], f"coordinates of the {name} of the plane", "Give three real numbers.")
+    size = float(np.abs(found[1]).max())
+    if size == 0.0:
+        raise InvalidPointsError("The normal of the plane has length 0. Give a vector across the plane.")
+    across = found[1] / size
+    return found[0], across / np.linalg.norm(across)

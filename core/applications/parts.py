@@ -6,16 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial import cKDTree
 
 from ..arguments import check_array
 from ..errors import InvalidPointsError
-from ..geometry import as_mask
 from ..operator import LaplaceBeltrami
 from ..types import Bools, Floats, Ints, Progress
 from .regions import LENGTH_OFF, STRIP, SurfaceMeasures, measure_region
-
-_NEAR = 7  # nearest points, the point itself among them, of which one is beyond the rim
 
 
 @dataclass(frozen=True)
@@ -151,95 +147,6 @@ def part_means(laplacian: LaplaceBeltrami, values: ArrayLike, labels: ArrayLike 
     with np.errstate(divide="ignore", invalid="ignore"):
         total = parts.sums(weight)
         return parts.sums(weight * numbers) / total, np.sqrt(parts.sums(weight * numbers**2) / total)
-
-
-@dataclass(frozen=True)
-class Pile:
-    """The volume between a part of the surface and the plane through its rim.
-
-    Attributes
-    ----------
-    above, below : float
-        On the side that most of the part lies on, and on the other one, neither negative [L^3].
-    uncertainty : float
-        What it leaves open that the rim is not plane, and where it is [L^3].
-    """
-
-    above: float
-    below: float
-    uncertainty: float
-
-
-def pile_volume(laplacian: LaplaceBeltrami, members: ArrayLike) -> Pile:
-    """Measure the volume between a part of the surface and the plane through its rim, as of a heap on the ground.
-
-    Parameters
-    ----------
-    laplacian : LaplaceBeltrami
-        Of n points.
-    members : array_like, (n,) bool or (k,) int
-        The points of the part.
-
-    Returns
-    -------
-    Pile
-
-    Raises
-    ------
-    InvalidPointsError
-        Members of another kind, none on the surface, or fewer than three points at their rim: there is no plane.
-
-    See Also
-    --------
-    enclosed_volume : The volume within a closed surface.
-    measure_region : Area and boundary of the part.
-
-    Notes
-    -----
-    The sum of area elements, projected onto the plane, times heights above it. The rim are the points on both sides of
-    the line between members and others, and those at the boundary of the surface; the plane is fitted to them by least
-    squares. One through all members would have as much above it as below. A part that overhangs its rim is measured
-    right if its normals point to one side.
-
-    Examples
-    --------
-    Half of the unit ball, 2 pi / 3:
-
-    >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> found = core.pile_volume(core.build_laplacian(points), points[:, 2] > 0)
-    >>> print(round(found.above, 1), found.below < 0.1)
-    2.1 True
-    """
-    chosen = as_mask(members, len(laplacian.points)) & (laplacian.component >= 0)
-    rim = _rim(laplacian, chosen)
-    if len(rim) < 3:
-        raise InvalidPointsError(
-            f"The part of {np.count_nonzero(chosen)} points has {len(rim)} points at its rim, through which there is no"
-            " plane. Choose a part of the surface that ends somewhere."
-        )
-    points = laplacian.surface_points
-    middle = points[rim].mean(axis=0)
-    axis = np.linalg.eigh((points[rim] - middle).T @ (points[rim] - middle))[1][:, 0]
-    height = (points[chosen] - middle) @ axis
-    facing = laplacian.normals[chosen] @ axis
-    column = laplacian.areas[chosen] * height * facing
-    base = abs(float(laplacian.areas[chosen] @ facing))
-    off = float(np.sqrt(np.mean(((points[rim] - middle) @ axis) ** 2)))
-    sides = float(column[height > 0.0].sum()), float(column[height <= 0.0].sum())
-    most, least = sorted(map(abs, sides), reverse=True)
-    return Pile(most, least, off * base)
-
-
-def _rim(laplacian: LaplaceBeltrami, chosen: Bools) -> Ints:
-    """Return the points on both sides of the line around a part, and of the part at the surface's boundary."""
-    known = np.flatnonzero(laplacian.component >= 0)
-    points = laplacian.surface_points[known]
-    near = known[cKDTree(points).query(points, k=min(_NEAR, len(known)), workers=-1)[1]]
-    apart = (chosen[near] != chosen[known, None]) & (laplacian.component[near] == laplacian.component[known, None])
-    result: Ints = np.union1d(known[apart.any(axis=1)], np.flatnonzero(chosen & laplacian.boundary))
-    return result
 
 
 class _Labelled:

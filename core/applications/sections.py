@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import as_doubles, check_array, check_finite
-from ..errors import InvalidPointsError
+from ..arguments import check_plane
 from ..operator import ImplicitSurface, LaplaceBeltrami
 from ..types import Bools, Floats, Progress, Report
 from .iso_lines import IsoLine, iso_lines
@@ -126,7 +125,7 @@ def cross_section(
     >>> print(len(found.curves), round(found.enclosed_area / np.pi, 2))
     1 0.75
     """
-    place, across = _plane(point, normal)
+    place, across = check_plane(point, normal)
     report = progress or (lambda stage, fraction: None)
     mesh = mesh or mesh_surface(laplacian, progress=progress)
     report("Section", 0.95)
@@ -147,20 +146,6 @@ def cross_section(
         enclosed_area=float(areas.sum()),
         notices=_notices(curves, len(lines) - len(kept), flat),
     )
-
-
-def _plane(point: ArrayLike, normal: ArrayLike) -> tuple[Floats, Floats]:
-    """Return a point of the plane and its unit normal, or say what is wrong with them."""
-    found = []
-    for given, name in ((point, "point"), (normal, "normal")):
-        array = check_array(given, f"Coordinates of the {name} of the plane", [(3,)], "Give three real numbers.")
-        found.append(as_doubles(array))
-        check_finite(found[-1], f"coordinates of the {name} of the plane", "Give three real numbers.")
-    size = float(np.abs(found[1]).max())
-    if size == 0.0:
-        raise InvalidPointsError("The normal of the plane has length 0. Give a vector across the plane.")
-    across = found[1] / size
-    return found[0], across / np.linalg.norm(across)
 
 
 def _onto(

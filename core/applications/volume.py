@@ -10,7 +10,7 @@ from ..operator import ImplicitSurface, LaplaceBeltrami
 from ..types import Array, Bools, Floats, Ints, Progress
 from .meshing import SurfaceMesh, mesh_surface
 
-_NOISE = 0.12  # of the noise that a surface through noisy points may be off as a whole
+NOISE = 0.12  # of the noise that a surface through noisy points may be off as a whole
 _HIDDEN = 0.2  # of the area of an opening times its radius, within which the surface that closes it is taken to be
 _MIXED = 0.05  # share of the area whose normals may point to the other side before it is said
 
@@ -109,7 +109,7 @@ def enclosed_volume(
     dome, doubt = caps.domes(side)
     volumes = np.abs(flat + curved) + np.bincount(caps.component, dome, count)
     area = np.bincount(laplacian.component[kept], laplacian.areas[kept], count)
-    off = np.bincount(skin.component, np.abs(bulge), count) + _NOISE * unit * _noise(laplacian, surface, count) * area
+    off = np.bincount(skin.component, np.abs(bulge), count) + NOISE * unit * _noise(laplacian, surface, count) * area
     off += np.bincount(caps.component, doubt, count)
     inside = _cavities(skin, caps, count)
     return EnclosedVolume(

@@ -1,0 +1,80 @@
+import numpy as np
+import pytest
+
+import core
+
+
+@pytest.mark.parametrize("height", [-0.3, 0.0, 0.5])
+def test_the_volume_of_a_cap_above_its_rim(operators, height):
+    laplacian = operators("random sphere")
+    found = core.pile_volume(laplacian, laplacian.points[:, 2] > height)
+    rise = 1.0 - height
+    volume = np.pi * rise**2 * (3.0 - rise) / 3.0
+    assert found.above == pytest.approx(volume, rel=0.03)
+    assert abs(found.above - found.below - volume) < found.uncertainty < 0.15 * volume
+    assert found.below < 0.01 * volume
+
+
+def test_a_wave_has_as_much_above_the_plane_of_its_rim_as_below():
+    """A smooth wave of one period on flat ground: 0.1 sin(2 pi u) sin(pi u)^2 sin(pi v)^2, 0.025 / pi on both sides."""
+    u, v = np.meshgrid(np.linspace(-0.5, 1.5, 81), np.linspace(-0.5, 1.5, 81), indexing="ij")
+    inside = (np.abs(u - 0.5) < 0.5) & (np.abs(v - 0.5) < 0.5)
+    ends = np.where(inside, np.sin(np.pi * u) ** 2 * np.sin(np.pi * v) ** 2, 0.0)
+    points = np.column_stack([u.ravel(), v.ravel(), (0.1 * np.sin(2.0 * np.pi * u) * ends).ravel()])
+    found = core.pile_volume(core.build_laplacian(points), inside.ravel())
+    np.testing.assert_allclose([found.above, found.below], 0.025 / np.pi, rtol=0.03)
+
+
+def test_piles_turn_and_scale(operators):
+    laplacian = operators("even sphere")
+    turn = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
+    chosen = laplacian.points[:, 0] > 0.2
+    one = core.pile_volume(laplacian, chosen)
+    other = core.pile_volume(core.build_laplacian(2.0 * laplacian.points @ turn.T), chosen)
+    assert other.above == pytest.approx(8.0 * one.above, rel=1e-4)
+    assert other.uncertainty == pytest.approx(8.0 * one.uncertainty, rel=1e-4)
+
+
+def test_what_ends_nowhere_has_no_rim(operators):
+    laplacian = operators("even sphere")
+    with pytest.raises(core.InvalidPointsError, match="The part of 2500 points has 0 points at its rim"):
+        core.pile_volume(laplacian, np.ones(2500, dtype=bool))
+
+
+@pytest.mark.parametrize("place", [-1.0, 0.5, 0.8])
+def test_a_plane_that_is_chosen_has_a_sign(operators, place):
+    """The cap above 0.5, against planes below it, through its rim and within it."""
+    laplacian = operators("random sphere")
+    cap = laplacian.points[:, 2] > 0.5
+    up, down = (core.pile_volume(laplacian, cap, plane=([3.0, 1.0, place], [0.0, 0.0, 2.0 * sign])) for sign in (1, -1))
+    # By the integral of pi (1 - z^2) over heights, of the whole base below the rim.
+    low = max(place, 0.5)
+    above = np.pi * (2.0 / 3.0 - low + low**3 / 3.0) + 0.75 * np.pi * (low - place)
+    below = np.pi * (low - 0.5) * 0.75 - np.pi * ((low - low**3 / 3.0) - (0.5 - 0.125 / 3.0))
+    assert (up.above, up.below) == (down.below, down.above)
+    assert abs(up.above - above) < up.uncertainty
+    assert abs(up.below - below) < up.uncertainty < 0.06 * (above + below)
+
+
+def test_what_is_measured_against_a_plane_follows_rotation_and_scale(operators):
+    laplacian = operators("even sphere")
+    turn = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
+    chosen, place, across = laplacian.points[:, 0] > 0.2, np.array([0.1, 0.0, -0.3]), np.array([0.3, 0.1, 1.0])
+    one = core.pile_volume(laplacian, chosen, plane=(place, across))
+    moved = core.build_laplacian(2.0 * laplacian.points @ turn.T)
+    other = core.pile_volume(moved, chosen, plane=(2.0 * turn @ place, turn @ across))
+    assert [other.above, other.below] == pytest.approx([8.0 * one.above, 8.0 * one.below], rel=1e-4)
+    assert other.uncertainty == pytest.approx(8.0 * one.uncertainty, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("members", "plane", "text"),
+    [
+        ([0], ([0.0, 0.0, 0.0], [0.0, 0.0, 0.0]), "normal of the plane has length 0"),
+        ([0], ([0.0, np.nan, 0.0], [0.0, 0.0, 1.0]), "point of the plane"),
+        ([], None, "None of the 2500 points"),
+    ],
+)
+def test_what_is_no_plane_or_no_part_is_refused(operators, members, plane, text):
+    with pytest.raises(core.InvalidPointsError, match=text):
+        core.pile_volume(operators("even sphere"), np.array(members, dtype=int), plane=plane)
