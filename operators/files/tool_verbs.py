@@ -27,7 +27,10 @@ from .arguments import as_place, place
 from .rows import TABLES, write_rows
 from .verbs import LEFT_OUT, Apply
 
-_CURVES = "curve,closed,x,y,z", ["%d", "%d", "%.17g", "%.17g", "%.17g"]  # columns of a file of curves, and their form
+_CURVES = (  # columns of a file of curves, and their form
+    "curve,closed,hole,length,area,x,y,z",
+    ["%d", "%d", "%d", "%.9g", "%.9g", "%.17g", "%.17g", "%.17g"],
+)
 _PLACES = "--at"  # group of the points nearest to given positions
 
 
@@ -204,9 +207,13 @@ class Section(Apply):
             opening.save_scene(output)
             return []
         offset, curves = place_of(obj), tool.found.curves
-        columns = [
-            np.column_stack([np.full((len(curve.points), 2), (number, curve.closed)), curve.points + offset])
+        rows = [
+            (number, curve.closed, curve.enclosed_area < 0.0, curve.length, curve.enclosed_area)
             for number, curve in enumerate(curves, 1)
+        ]
+        columns = [
+            np.column_stack([np.tile(row, (len(curve.points), 1)), curve.points + offset])
+            for row, curve in zip(rows, curves, strict=True)
         ]
         with replacing(output) as part:
             np.savetxt(part, np.concatenate(columns), _CURVES[1], ",", header=_CURVES[0], comments="")
@@ -217,6 +224,7 @@ class Section(Apply):
         return {
             "curves": len(found.curves),
             "open_curves": sum(not curve.closed for curve in found.curves),
+            "holes": sum(curve.enclosed_area < 0.0 for curve in found.curves),
             "length": found.length,
             "enclosed_area": found.enclosed_area,
         }

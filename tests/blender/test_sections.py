@@ -99,10 +99,23 @@ class TestVerb:
         assert (line["curves"], line["open_curves"]) == (1, 0)
         assert line["length"] == pytest.approx(np.pi * np.sqrt(3.0), rel=5e-3)
         assert line["enclosed_area"] == pytest.approx(0.75 * np.pi, rel=5e-3)
-        assert (tmp_path / "out.csv").read_text().startswith("curve,closed,x,y,z\n1,1,")
+        assert (tmp_path / "out.csv").read_text().startswith("curve,closed,hole,length,area,x,y,z\n1,1,0,")
         rows = np.loadtxt(tmp_path / "out.csv", delimiter=",", skiprows=1)
-        assert_allclose(rows[:, 3], 5_000_000.5, rtol=0.0, atol=1e-6)
-        assert_allclose(np.linalg.norm(rows[:, 2:] - far, axis=1), 1.0, atol=3e-3)
+        assert_allclose(rows[:, 6], 5_000_000.5, rtol=0.0, atol=1e-6)
+        assert_allclose(np.linalg.norm(rows[:, 5:] - far, axis=1), 1.0, atol=3e-3)
+
+    def test_holes_are_marked(self, run, tmp_path):  # noqa: F811
+        """A ball within a ball: the section is a ring."""
+        path = self.write(tmp_path / "a.csv", np.concatenate([sphere_points(1000), 0.5 * sphere_points(500, seed=1)]))
+        code, [line] = run("cross-section", path, "--plane", "0,0,0", "--out", tmp_path / "out.csv")
+        assert code == 0, line
+        assert (line["curves"], line["holes"]) == (2, 1)
+        rows = np.loadtxt(tmp_path / "out.csv", delimiter=",", skiprows=1)
+        table = np.unique(rows[:, :5], axis=0)
+        assert table[:, :3].tolist() == [[1, 1, 0], [2, 1, 1]]
+        assert_allclose(table[:, 3], [2.0 * np.pi, np.pi], rtol=5e-3)
+        assert_allclose(table[:, 4], [np.pi, -0.25 * np.pi], rtol=5e-3)
+        assert table[:, 4].sum() == pytest.approx(line["enclosed_area"])
 
     def test_without_a_plane_it_is_said(self, run, tmp_path):  # noqa: F811
         path = self.write(tmp_path / "a.csv", sphere_points(1000))
