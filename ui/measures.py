@@ -8,8 +8,9 @@ from ..operators.objects.parts import are_outdated, kept_rows
 from ..operators.objects.quantities import quantity
 from ..operators.registration import Registration, Row
 from ..operators.running.ready import ReadyOperator
+from ..operators.tools.measure_live import followed
 from .units import attribute_power, unit
-from .wrapping import beside_or_below, draw_text
+from .wrapping import beside_or_below, draw_text, split_properties
 
 _SHOWN = 8  # parts in the panel
 _MOST = 7  # digits, as single precision keeps them
@@ -118,6 +119,36 @@ def _draw_line(layout, context, title, text):
     line = beside_or_below(layout, context, title, text)
     line.label(text=title)
     line.label(text=text)
+
+
+def draw_selection(layout, context):
+    """Draw the button that lets measures follow the selection of the active object, the plane, and the figures."""
+    obj, known = context.object, followed(context.object)
+    layout.operator("meshfree.measure_live", depress=known is not None)
+    column = layout.column(align=True)
+    split_properties(column, context)
+    column.prop(obj.meshfree, "volume_over")
+    if obj.meshfree.volume_over == "LEVEL":
+        column.prop(obj.meshfree, "volume_height")
+    elif obj.meshfree.volume_over == "OBJECT":
+        column.prop_search(obj.meshfree, "volume_plane", context.scene, "objects", text="Plane")
+    if known is None:
+        return
+    box = layout.box().column(align=True)
+    for figure in known.figures:
+        _draw_line(box, context, figure.title, figure_text(figure, context.scene.unit_settings))
+    for notice in known.notices:
+        draw_text(box, context, notice, "INFO")
+
+
+def figure_text(figure, settings) -> str:
+    """Write a measure with its uncertainty and its unit."""
+    raised, factor = unit(figure.power, max(map(abs, figure.values)), settings)
+    numbers = [rounded(value * factor, figure.uncertainty * factor) for value in figure.values]
+    text = " x ".join(number for number, _ in numbers)
+    if figure.uncertainty > 0.0:
+        text = f"{text} ± {numbers[0][1]}"
+    return f"{text} {raised}".rstrip()
 
 
 class MESHFREE_OT_copy_measures(ReadyOperator, bpy.types.Operator):

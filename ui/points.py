@@ -18,6 +18,7 @@ from ..operators.objects.groups import (
 from ..operators.objects.reading import TYPES
 from ..operators.tools.convert import MESHFREE_OT_convert
 from . import colormaps
+from .measures import draw_selection
 from .panel import SidebarPanel, draw_tools
 
 _TITLES = {
@@ -48,6 +49,7 @@ class MESHFREE_PT_points(SidebarPanel, bpy.types.Panel):
     def draw(self, context):
         layout, obj = self.layout, context.object
         draw_tools(layout, self.bl_label)
+        draw_selection(layout, context)
         layout.prop(obj.meshfree, "show_groups")
         column = layout.column(align=True)
         for role, title in _TITLES.items():

@@ -17,6 +17,7 @@ _OWN = {
     "sequence_written": [],  # (objects, name of the attribute to show in one range): ui/show.py
     "views_changed": [],  # () what is drawn over them: ui/show.py
     "panels_changed": [],  # () what they show of running work: ui/show.py
+    "measuring_changed": [],  # () the plane of volumes: operators/tools/measure_live.py
     "deform_changed": [],  # (obj) by a setting: operators/deform/live.py
     "bound_changed": [],  # () which objects are bound: operators/deform/live.py
 }

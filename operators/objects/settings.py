@@ -44,6 +44,10 @@ def _redraw(settings, context):
     notify("views_changed")
 
 
+def _measure_again(settings, _context):
+    notify("measuring_changed")
+
+
 class MESHFREE_PG_stage(bpy.types.PropertyGroup):
     """How long one stage of the last analysis took"""
 
@@ -326,6 +330,31 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
         description="Draw a line for comparison at 4 pi k / area, which the eigenvalues of any surface approach",
         default=True,
         update=_redraw,
+    )
+    volume_over: EnumProperty(
+        name="Volume Over",
+        description="The plane from which the volume under selected points is measured",
+        items=(
+            ("RIM", "Rim", "The plane through the rim of the selection, as of a heap on the ground"),
+            ("LEVEL", "Height", "The horizontal plane at a height"),
+            ("OBJECT", "Object", "The local XY plane of an object, such as an empty"),
+        ),
+        default="RIM",
+        update=_measure_again,
+    )
+    volume_height: FloatProperty(
+        name="Height",
+        description="Height of the horizontal plane in the world",
+        default=0.0,
+        soft_min=-1000.0,
+        soft_max=1000.0,
+        subtype="DISTANCE",
+        update=_measure_again,
+    )
+    volume_plane: StringProperty(
+        name="Plane of Volume",
+        description="Object whose local XY plane volumes are measured from; its Z axis points to what is above",
+        update=_measure_again,
     )
     spacing: FloatProperty(
         name="Spacing",

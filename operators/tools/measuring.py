@@ -1,5 +1,7 @@
 """Measures of selected points: area, boundary, sizes, curvature and volume; the shortest path between two points."""
 
+from typing import NamedTuple
+
 import bpy
 import numpy as np
 from bpy.props import BoolProperty, FloatProperty
@@ -7,11 +9,60 @@ from bpy.props import BoolProperty, FloatProperty
 from ... import core
 from ...core import PointCloudError
 from ..objects.curves import add_curves
+from ..objects.planes import plane_of
 from ..objects.result import area_text, length_text, volume_text
 from ..registration import Registration, Row
 from ..running import cache
 from .mesh import volume_of
 from .select import SelectionOperator, analyzed, selected
+
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+class Figure(NamedTuple):
+    """A measure, in world lengths.
+
+    Attributes
+    ----------
+    title : str
+    values : tuple of float
+    uncertainty : float
+        Within which the true value is expected; 0 if that is not known.
+    power : int
+        Of length.
+    """
+
+    title: str
+    values: tuple
+    uncertainty: float
+    power: int
+
+
+class Measured(NamedTuple):
+    """Measures of selected points.
+
+    Attributes
+    ----------
+    area, boundary, size, mean_curvature, largest_curvature : Figure
+    above, below, net : Figure or None
+        Volumes on both sides of a plane, and their difference.
+    notices : list of str
+    """
+
+    area: Figure
+    boundary: Figure
+    size: Figure
+    mean_curvature: Figure
+    largest_curvature: Figure
+    above: Figure | None
+    below: Figure | None
+    net: Figure | None
+    notices: list
+
+    @property
+    def figures(self) -> list:
+        """All of them that there are."""
+        return [item for item in self if isinstance(item, Figure)]
 
 
 class MESHFREE_OT_measure_selection(SelectionOperator, bpy.types.Operator):
@@ -23,59 +74,103 @@ class MESHFREE_OT_measure_selection(SelectionOperator, bpy.types.Operator):
     volume: BoolProperty(
         name="Volume",
         description="Measure the volume within the whole surface, its openings closed, and that of the selected points"
-        " over the plane of their rim. It takes longer",
+        " over the plane of Volume Over. It takes longer",
         default=False,
     )
 
     def prepare(self, context, obj):
         chosen = selected(obj)
         _, laplacian = analyzed(context, obj)
-        region = cache.result(laplacian, "region", chosen, compute=lambda: core.measure_region(laplacian, chosen))
-        lines, notices = _texts(laplacian, region, chosen), []
+        plane = volume_plane(context.scene, obj) if self.volume else None
+        found = measured(laplacian, chosen, plane, lambda *_: None)
+        lines, notices = _texts(found), []
         if self.volume:
-            found = volume_of(laplacian, lambda *_: None)
-            lines.append(f"Volume {_within(volume_text, found.volume, found.uncertainty)}")
-            pile, missing = _pile(laplacian, chosen)
-            lines += pile
-            notices = [*found.notices, *missing]
-        left = np.count_nonzero(chosen & (laplacian.component < 0))
-        if left:
-            notices = [f"{left:,} selected points are left out of the Laplacian, and not measured.", *notices]
+            whole = volume_of(laplacian, lambda *_: None)
+            lines.append(f"Volume {_within(volume_text, whole.volume, whole.uncertainty)}")
+            lines += _pile_text(found, obj.meshfree)
+            notices = [*whole.notices, *found.notices]
+        left = left_out(laplacian, chosen)
 
         def keep():
             self.begin_notices([obj])
             for line in lines:
                 self.note(f"{obj.name}: {line}", obj)
-            for notice in notices:
+            for notice in [*left, *notices]:
                 self.warn(notice, obj)
             return f"{np.count_nonzero(chosen):,} points are measured"
 
         return keep
 
 
-def _texts(laplacian, region, chosen):
-    """Return the figures of a part as lines."""
+def volume_plane(scene, obj):
+    """Return the plane that the settings of an object name, a point and a normal as its points are read, or None."""
+    kept = obj.meshfree
+    if kept.volume_over == "LEVEL":
+        return np.array([0.0, 0.0, kept.volume_height]) - np.array(obj.matrix_world.translation), _UP
+    return plane_of(scene, kept.volume_plane, obj) if kept.volume_over == "OBJECT" else None
+
+
+def measured(laplacian, chosen, plane, progress) -> Measured:
+    """Measure the points of a part, (n,) bool, at least one of which the operator has.
+
+    `plane` is a point and a normal, or None for the plane through the rim.
+    """
+    whole = cache.result(laplacian, "measures", compute=lambda: core.SurfaceMeasures(laplacian))
+    region = cache.result(
+        laplacian,
+        "region",
+        chosen,
+        compute=lambda: core.measure_region(laplacian, chosen, measures=whole, progress=progress),
+    )
     known = chosen & (laplacian.component >= 0)
     sizes = np.ptp(laplacian.surface_points[known], axis=0)
-    curvature = core.mean_curvature(laplacian)[known]
-    areas = laplacian.areas[known]
-    mean, most = areas @ curvature / areas.sum(), curvature[np.abs(curvature).argmax()]
+    curvature = cache.result(laplacian, "curvature", compute=lambda: core.mean_curvature(laplacian))[known]
+    areas, most = laplacian.areas[known], curvature[np.abs(curvature).argmax()]
+    piles, notices = (None, None, None), []
+    try:
+        pile = core.pile_volume(laplacian, chosen, plane=plane, measures=whole)
+    except core.InvalidPointsError as error:
+        notices = [f"{error} Its volume over the rim was not measured."]
+    else:
+        sides = {"Above the Plane": pile.above, "Below the Plane": pile.below, "Difference": pile.above - pile.below}
+        piles = tuple(Figure(title, (volume,), pile.uncertainty, 3) for title, volume in sides.items())
+    return Measured(
+        Figure("Area", (region.area,), region.area_uncertainty, 2),
+        Figure("Boundary", (region.boundary_length,), region.length_uncertainty, 1),
+        Figure("Size", tuple(sizes.tolist()), 0.0, 1),
+        Figure("Mean Curvature", (float(areas @ curvature / areas.sum()),), 0.0, -1),
+        Figure("Largest Curvature", (float(most),), 0.0, -1),
+        *piles,
+        notices,
+    )
+
+
+def left_out(laplacian, chosen) -> list:
+    """Return a notice of the points of a part, (n,) bool, that the operator has not."""
+    left = np.count_nonzero(chosen & (laplacian.component < 0))
+    return [f"{left:,} selected points are left out of the Laplacian, and not measured."] if left else []
+
+
+def _texts(found):
+    """Return measures as lines."""
     return [
-        f"Area {_within(area_text, region.area, region.area_uncertainty)}",
-        f"Boundary {_within(length_text, region.boundary_length, region.length_uncertainty)}",
-        f"Size {' x '.join(map(length_text, sizes))} along the axes of the world",
-        f"Mean curvature {mean:.4g} on average, {most:.4g} at most, in 1 / length",
+        f"Area {_within(area_text, *found.area.values, found.area.uncertainty)}",
+        f"Boundary {_within(length_text, *found.boundary.values, found.boundary.uncertainty)}",
+        f"Size {' x '.join(map(length_text, found.size.values))} along the axes of the world",
+        f"Mean curvature {found.mean_curvature.values[0]:.4g} on average,"
+        f" {found.largest_curvature.values[0]:.4g} at most, in 1 / length",
     ]
 
 
-def _pile(laplacian, chosen):
-    """Return the volumes above and below the plane through the rim of a part as a line, or why there are none."""
-    try:
-        found = core.pile_volume(laplacian, chosen)
-    except core.InvalidPointsError as error:
-        return [], [f"{error} Its volume over the rim was not measured."]
-    above = _within(volume_text, found.above, found.uncertainty)
-    return [f"Over the plane of its rim {above}, below it {volume_text(found.below)}"], []
+def _pile_text(found, settings):
+    """Return the volumes on both sides of the plane as a line, if they were measured."""
+    if found.above is None:
+        return []
+    (above,), (below,), (net,) = found.above.values, found.below.values, found.net.values
+    name = {"LEVEL": f"the height {length_text(settings.volume_height)}", "OBJECT": f'"{settings.volume_plane}"'}
+    plane = name.get(settings.volume_over, "the plane of its rim")
+    difference = _within(volume_text, net, found.net.uncertainty)
+    return [f"Over {plane} {volume_text(above)}, below it {volume_text(below)}, the difference {difference}"]
 
 
 def _within(text, value, off):

@@ -7,6 +7,7 @@ from bpy.props import FloatProperty, StringProperty
 from ... import core
 from ...core import PointCloudError
 from ..objects.curves import add_curves
+from ..objects.planes import plane_of
 from ..objects.result import area_text, length_text
 from ..registration import Registration, Row
 from ..running.application import ApplicationOperator, Tool, naming, operator_reader
@@ -68,16 +69,7 @@ class CrossSection(Tool):
         if not self.plane:
             middle = 0.5 * (reading.points.min(axis=0) + reading.points.max(axis=0))
             return middle, _UP, f"{obj.name} is cut by the horizontal plane through its middle: no Plane is chosen."
-        found = context.scene.objects.get(self.plane)
-        if found is None:
-            raise PointCloudError(
-                f'There is no object "{self.plane}" in this scene. Choose one whose local XY plane cuts the surface.'
-            )
-        matrix = np.array(found.matrix_world, dtype=np.float64)
-        normal = np.cross(matrix[:3, 0], matrix[:3, 1])
-        if not normal.any():
-            raise PointCloudError(f'"{self.plane}" is scaled to nothing along X or Y, so that it has no plane.')
-        return matrix[:3, 3] - np.array(obj.matrix_world.translation), normal, ""
+        return *plane_of(context.scene, self.plane, obj), ""
 
     def write(self, context, obj, result):
         self.found, lines, guessed = result

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.blender.clouds import add_object, local_points, sphere_points
+from tests.blender.conftest import part
 from tests.blender.operators import refused
 
 
@@ -94,3 +95,147 @@ def test_a_path_of_points_with_columns_of_their_file(obj):
     choose(obj, np.arange(1000) < 2)
     assert bpy.ops.meshfree.geodesic_path() == {"FINISHED"}
     assert tuple(bpy.data.objects[f"{obj.name} Path"]["lb_offset"]) == (100.0, 0.0, 0.0)
+
+
+class TestPlanes:
+    """The planes over which the volume under selected points is measured."""
+
+    @pytest.fixture
+    def cap(self, obj):
+        choose(obj, local_points(obj)[:, 2] > 0.0)
+        obj.location = (0.0, 0.0, 3.0)
+        bpy.context.view_layer.update()
+        return obj
+
+    def net(self, obj, over):
+        bpy.ops.meshfree.measure_selection(volume=True)
+        return float(re.search(rf"Over {over} .* the difference (-?[\d.]+) ", told(obj)).group(1))
+
+    def test_a_height(self, cap):
+        cap.meshfree.volume_over, cap.meshfree.volume_height = "LEVEL", 2.0
+        assert self.net(cap, "the height 2 m") == pytest.approx(5.0 * np.pi / 3.0, rel=0.02)
+
+    def test_an_object_from_either_side(self, cap):
+        empty = bpy.data.objects.new("Ground", None)
+        empty.location = (5.0, 0.0, 2.0)
+        bpy.context.scene.collection.objects.link(empty)
+        cap.meshfree.volume_over, cap.meshfree.volume_plane = "OBJECT", empty.name
+        assert self.net(cap, '"Ground"') == pytest.approx(5.0 * np.pi / 3.0, rel=0.02)
+        empty.rotation_euler = (np.pi, 0.0, 0.0)
+        bpy.context.view_layer.update()
+        assert self.net(cap, '"Ground"') == pytest.approx(-5.0 * np.pi / 3.0, rel=0.02)
+
+    def test_no_object_is_refused(self, cap):
+        cap.meshfree.volume_over, cap.meshfree.volume_plane = "OBJECT", "Nobody"
+        with refused(cap, 'There is no object "Nobody"'):
+            bpy.ops.meshfree.measure_selection(volume=True)
+        assert bpy.ops.meshfree.measure_selection() == {"FINISHED"}
+
+
+class TestLive:
+    """Measures that follow the selection in Edit Mode."""
+
+    @pytest.fixture
+    def live(self, obj):
+        choose(obj, local_points(obj)[:, 2] > 0.0)
+        bpy.ops.object.mode_set(mode="EDIT")
+        assert bpy.ops.meshfree.measure_live() == {"FINISHED"}
+        yield obj
+        part("operators.tools.measure_live").stop()
+
+    def shown(self, obj):
+        """Return the figures and notices that the panel shows, None if it shows none."""
+        known = part("operators.tools.measure_live").followed(obj)
+        return known and ({figure.title: figure.values for figure in known.figures}, known.notices)
+
+    def pick(self, obj, chosen):
+        """Select points in Edit Mode, as Blender's tools do."""
+        import bmesh  # there once bpy is
+
+        edited = bmesh.from_edit_mesh(obj.data)
+        for point, wanted in zip(edited.verts, chosen.tolist(), strict=True):
+            point.select = wanted
+        bmesh.update_edit_mesh(obj.data, loop_triangles=False, destructive=False)
+        bpy.context.view_layer.update()
+
+    def test_the_figures_follow_the_selection(self, live):
+        points = np.array([point.co for point in live.data.vertices])
+        figures, notices = self.shown(live)
+        assert figures["Area"][0] == pytest.approx(2.0 * np.pi, rel=0.02)
+        assert figures["Above the Plane"][0] == pytest.approx(2.0 * np.pi / 3.0, rel=0.04)
+        self.pick(live, points[:, 2] > 0.5)
+        figures, notices = self.shown(live)
+        assert figures["Area"][0] == pytest.approx(np.pi, rel=0.02)
+        assert figures["Boundary"][0] == pytest.approx(np.pi * np.sqrt(3.0), rel=0.02)
+        assert figures["Mean Curvature"][0] == pytest.approx(1.0, rel=0.02)
+        bpy.ops.mesh.select_all(action="DESELECT")
+        assert self.shown(live) == ({}, ["No points are selected"])
+        bpy.ops.mesh.select_all(action="SELECT")
+        figures, notices = self.shown(live)
+        assert figures["Area"][0] == pytest.approx(4.0 * np.pi, rel=0.02)
+        assert "Above the Plane" not in figures
+        assert "at its rim" in notices[0]
+
+    def test_the_same_selection_is_not_measured_again(self, live, monkeypatch):
+        module = part("operators.tools.measure_live")
+        calls = []
+        monkeypatch.setattr(module, "measured", lambda *_: calls.append(_))
+        live.update_tag()
+        bpy.context.view_layer.update()
+        bpy.ops.ed.undo_push(message="Nothing")
+        assert calls == []
+        bpy.ops.mesh.select_all(action="INVERT")
+        assert len(calls) == 1
+
+    def test_nothing_is_written(self, live):
+        bpy.ops.mesh.select_all(action="INVERT")
+        bpy.ops.object.mode_set(mode="OBJECT")
+        assert not len(live.meshfree.notices)
+        assert [name for name in live.data.attributes.keys() if name.startswith("lb_")] == []
+
+    def test_another_plane_is_measured_from_at_once(self, live):
+        live.meshfree.volume_height = -1.0
+        live.meshfree.volume_over = "LEVEL"
+        assert self.shown(live)[0]["Above the Plane"][0] == pytest.approx(5.0 * np.pi / 3.0, rel=0.02)
+        live.meshfree.volume_over = "OBJECT"
+        assert 'There is no object ""' in self.shown(live)[1][0]
+
+    def test_points_that_are_moved_are_not_measured(self, live):
+        bpy.ops.transform.translate(value=(0.0, 0.0, 1.0))
+        bpy.context.view_layer.update()
+        figures, notices = self.shown(live)
+        assert figures == {}
+        assert "were changed" in notices[0]
+        bpy.ops.transform.translate(value=(0.0, 0.0, -1.0))
+        bpy.context.view_layer.update()
+        bpy.ops.mesh.delete(type="VERT")
+        assert "were changed" in self.shown(live)[1][0]
+
+    def test_a_change_of_settings_is_told(self, live):
+        live.meshfree.bandwidth_factor = 1.2
+        bpy.ops.mesh.select_all(action="INVERT")
+        assert "were changed" in self.shown(live)[1][0]
+
+    @pytest.mark.parametrize(
+        "end",
+        [
+            lambda: bpy.ops.meshfree.measure_live(),
+            lambda: bpy.ops.object.mode_set(mode="OBJECT"),
+            lambda: bpy.ops.wm.read_homefile(use_empty=True),
+        ],
+        ids=["off", "mode", "file"],
+    )
+    def test_it_ends(self, live, end):
+        name = live.name
+        end()
+        assert self.shown(bpy.data.objects.get(name)) is None
+
+    def test_it_needs_edit_mode(self, obj):
+        assert not bpy.ops.meshfree.measure_live.poll()
+
+    def test_figures_have_the_digits_of_their_uncertainty(self, installed):
+        figure = part("operators.tools.measuring").Figure
+        text, scene = part("ui.measures").figure_text, bpy.context.scene.unit_settings
+        assert text(figure("Area", (1.23456,), 0.013, 2), scene) == "1.235 ± 0.013 m²"
+        assert text(figure("Size", (0.1, 0.02, 0.03), 0.0, 1), scene) == "10 x 2 x 3 cm"
+        assert text(figure("Mean Curvature", (-0.5,), 0.0, -1), scene) == "-0.5 1/m"

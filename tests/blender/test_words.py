@@ -18,6 +18,7 @@ NO_UNDO = {
     "export_operator",
     "export_points",
     "export_splats",
+    "measure_live",
     "stop",
 }
 UNLOGGED = {"stop"}  # nothing to repeat

@@ -1,0 +1,25 @@
+"""Planes that objects give, such as empties."""
+
+import numpy as np
+
+from ...core import PointCloudError
+
+
+def plane_of(scene, name, obj):
+    """Return the local XY plane of an object of a scene: a point, from the location of another one on, and a normal.
+
+    Raises
+    ------
+    PointCloudError
+        There is no such object, or it has no plane.
+    """
+    found = scene.objects.get(name)
+    if found is None:
+        raise PointCloudError(
+            f'There is no object "{name}" in this scene. Choose one whose local XY plane is meant, such as an empty.'
+        )
+    matrix = np.array(found.matrix_world, dtype=np.float64)
+    normal = np.cross(matrix[:3, 0], matrix[:3, 1])
+    if not normal.any():
+        raise PointCloudError(f'"{name}" is scaled to nothing along X or Y, so that it has no plane.')
+    return matrix[:3, 3] - np.array(obj.matrix_world.translation), normal
