@@ -143,7 +143,7 @@ def draw_selection(layout, context):
 
 def figure_text(figure, settings) -> str:
     """Write a measure with its uncertainty and its unit."""
-    raised, factor = unit(figure.power, max(map(abs, figure.values)), settings)
+    raised, factor = unit(figure.power, max(figure.uncertainty, *map(abs, figure.values)), settings)
     numbers = [rounded(value * factor, figure.uncertainty * factor) for value in figure.values]
     text = " x ".join(number for number, _ in numbers)
     if figure.uncertainty > 0.0:

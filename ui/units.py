@@ -19,6 +19,7 @@ _ADAPTIVE = {
     "IMPERIAL": ("MILES", "FEET", "INCHES", "THOU"),
 }
 _LEFT_OPEN = ("ADAPTIVE", "METERS", "FEET")  # the latter two are defaults of new scenes
+_LEAST = {3: 0.01}  # number in an adaptive unit, if not 1, by the power
 _RAISED = {1: "", 2: "²", 3: "³"}
 
 
@@ -37,7 +38,8 @@ def unit(power: int, greatest: float, settings):
         As of `attribute_power`.
     greatest : float
         The greatest number to be written, in world lengths: an adaptive unit of lengths and areas is the first one in
-        which it reaches 1, as in Blender.
+        which it reaches 1, as in Blender, and of volumes the first in which it reaches a hundredth, since a cubic meter
+        is a million cubic centimeters.
     settings : bpy.types.UnitSettings
         Of the scene.
 
@@ -57,6 +59,7 @@ def unit(power: int, greatest: float, settings):
     else:
         names = _ADAPTIVE[settings.system][1:2]
     factors = {name: (settings.scale_length / _METERS[name][1]) ** power for name in names}
-    name = next((name for name in names if factors[name] * abs(greatest) >= 1.0), names[-1])
+    least = _LEAST.get(power, 1.0)
+    name = next((name for name in names if factors[name] * abs(greatest) >= least), names[-1])
     raised = _METERS[name][0] + _RAISED[abs(power)]
     return (raised if power > 0 else f"1/{raised}"), factors[name]

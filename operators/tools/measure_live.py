@@ -85,9 +85,15 @@ class MESHFREE_OT_measure_live(SelectionOperator, bpy.types.Operator):
     bl_idname = "meshfree.measure_live"
     bl_label = "Measure Live"
     bl_options = {"REGISTER"}  # the scene is not changed
-    works_in = ("EDIT",)
     needs_selection = False
     _laplacian = None
+
+    @classmethod
+    def obstacle(cls, context):
+        reason = super().obstacle(context)
+        if reason or context.object.mode == "EDIT":
+            return reason
+        return f'"{context.object.name}" is not in Edit Mode. Switch to Edit Mode first, where points are selected'
 
     def invoke(self, context, event):
         return self.execute(context) if followed(context.object) else super().invoke(context, event)
@@ -96,7 +102,11 @@ class MESHFREE_OT_measure_live(SelectionOperator, bpy.types.Operator):
         if followed(context.object):
             stop()
             return {"FINISHED"}
-        return super().execute(context)
+        return self.follow(context.object, super().execute(context))
+
+    def complete(self, context, job):
+        done = super().complete(context, job)
+        return self.follow(job.snapshots[0].find(), done)
 
     def with_points(self, objects):
         return objects[:1]
@@ -105,12 +115,11 @@ class MESHFREE_OT_measure_live(SelectionOperator, bpy.types.Operator):
         _, self._laplacian = analyzed(context, obj)
         return lambda: "the measures follow the selection"
 
-    def change(self, context, objects):
-        """Begin to follow, back in Edit Mode: with shape keys it has other positions."""
-        done = super().change(context, objects)
+    def follow(self, obj, done):
+        """Begin to follow an object, back in Edit Mode: with shape keys it has other positions there."""
         if done == {"FINISHED"}:
             stop()
-            _followed.append(_Followed(context.object.session_uid, self._laplacian, _state(context.object)))
+            _followed.append(_Followed(obj.session_uid, self._laplacian, _state(obj)))
             _soon()
         return done
 

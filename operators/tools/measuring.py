@@ -45,7 +45,7 @@ class Measured(NamedTuple):
     ----------
     area, boundary, size, mean_curvature, largest_curvature : Figure
     above, below, net : Figure or None
-        Volumes on both sides of a plane, and their difference.
+        Volumes on both sides of a plane, and their difference where the plane was chosen, so that it has a sign.
     notices : list of str
     """
 
@@ -133,7 +133,9 @@ def measured(laplacian, chosen, plane, progress) -> Measured:
         notices = [f"{error} Its volume over the rim was not measured."]
     else:
         sides = {"Above the Plane": pile.above, "Below the Plane": pile.below, "Difference": pile.above - pile.below}
-        piles = tuple(Figure(title, (volume,), pile.uncertainty, 3) for title, volume in sides.items())
+        piles = [Figure(title, (volume,), pile.uncertainty, 3) for title, volume in sides.items()]
+        if plane is None:
+            piles[2] = None
     return Measured(
         Figure("Area", (region.area,), region.area_uncertainty, 2),
         Figure("Boundary", (region.boundary_length,), region.length_uncertainty, 1),
@@ -166,11 +168,14 @@ def _pile_text(found, settings):
     """Return the volumes on both sides of the plane as a line, if they were measured."""
     if found.above is None:
         return []
-    (above,), (below,), (net,) = found.above.values, found.below.values, found.net.values
-    name = {"LEVEL": f"the height {length_text(settings.volume_height)}", "OBJECT": f'"{settings.volume_plane}"'}
-    plane = name.get(settings.volume_over, "the plane of its rim")
-    difference = _within(volume_text, net, found.net.uncertainty)
-    return [f"Over {plane} {volume_text(above)}, below it {volume_text(below)}, the difference {difference}"]
+    (above,), (below,), off = found.above.values, found.below.values, found.above.uncertainty
+    if found.net is None:
+        return [f"Over the plane of its rim {_within(volume_text, above, off)}, below it {volume_text(below)}"]
+    name = f"the height {length_text(settings.volume_height)}"
+    if settings.volume_over == "OBJECT":
+        name = f'"{settings.volume_plane}"'
+    difference = _within(volume_text, found.net.values[0], off)
+    return [f"Over {name} {volume_text(above)}, below it {volume_text(below)}, the difference {difference}"]
 
 
 def _within(text, value, off):

@@ -237,5 +237,6 @@ class TestLive:
         figure = part("operators.tools.measuring").Figure
         text, scene = part("ui.measures").figure_text, bpy.context.scene.unit_settings
         assert text(figure("Area", (1.23456,), 0.013, 2), scene) == "1.235 ± 0.013 m²"
+        assert text(figure("Below the Plane", (1e-5,), 0.16, 3), scene) == "0.00 ± 0.16 m³"
         assert text(figure("Size", (0.1, 0.02, 0.03), 0.0, 1), scene) == "10 x 2 x 3 cm"
         assert text(figure("Mean Curvature", (-0.5,), 0.0, -1), scene) == "-0.5 1/m"
