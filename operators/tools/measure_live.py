@@ -8,13 +8,13 @@ import zlib
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import TYPE_CHECKING
 
 import bmesh
 import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
+from ... import core
 from ...core import Cancelled, PointCloudError
 from ..objects.attributes import positions_now
 from ..objects.handlers import add_handlers, notify, remove_handlers
@@ -26,9 +26,6 @@ from ..running.job import Job
 from ..running.ready import TROUBLES, error_text
 from .measuring import left_out, measured, volume_plane
 from .select import SelectionOperator, analyzed, selection
-
-if TYPE_CHECKING:
-    from ...core import LaplaceBeltrami
 
 _REST = 0.2  # seconds without a change after which the selection is measured
 _TICK = 0.05  # seconds between two looks at the thread
@@ -60,7 +57,7 @@ class _Followed:
     """
 
     uid: int
-    laplacian: "LaplaceBeltrami"
+    laplacian: "core.LaplaceBeltrami"
     state: tuple
     seen: tuple | None = None
     work: Job | None = None
