@@ -106,6 +106,8 @@ def pile_volume(
     if plane is None:
         place, axis = _fitted(points[rim], int(np.count_nonzero(chosen)))
     else:
+        if not isinstance(plane, (tuple, list, np.ndarray)) or len(plane) != 2:
+            raise InvalidPointsError("The plane is no pair. Give a point of it and a vector across it.")
         place, axis = check_plane(*plane)
     height, facing = (points - place) @ axis, laplacian.normals @ axis
     column = np.where(chosen, laplacian.areas * height * facing, 0.0)

@@ -71,6 +71,8 @@ def test_what_is_measured_against_a_plane_follows_rotation_and_scale(operators):
     ("members", "plane", "text"),
     [
         ([0], ([0.0, 0.0, 0.0], [0.0, 0.0, 0.0]), "normal of the plane has length 0"),
+        ([0], [0.0, 0.0, 1.0], "plane is no pair"),
+        ([0], 3.0, "plane is no pair"),
         ([0], ([0.0, np.nan, 0.0], [0.0, 0.0, 1.0]), "point of the plane"),
         ([], None, "None of the 2500 points"),
     ],
