@@ -10,23 +10,32 @@ from scipy import sparse
 from scipy.linalg import eigh
 
 from ..types import Array, Floats
-from .dense import product
-from .hierarchy import SMALL, Known, Level, build_levels, solve_roughly
+from .blocks import blocks, on_all_cores
+from .dense import product, subtract_product
+from .hierarchy import SMALL, Known, Level, build_levels, smoothed, solve_roughly
 
 _DENSE = 4000  # in ten seconds; where the coarsest version has more, another solver is faster
 _BEYOND = 0.1  # how far beyond the last eigenvalue wanted, as a share of it, the block of vectors reaches
 _GUARDS = 4  # vectors that it has more, at least
 _WIDE = 32  # multiplicity up to which it holds all copies of the last eigenvalue, however few are wanted
 _RANDOM = 4  # vectors that start from random numbers, and converge to those that the coarse versions miss
+_FILTERED = 3  # applications of the approximate inverse that leave little of their fast parts
 _GUARDED = 0.1  # residual to which these converge, so that none below those asked for is missed
 _COARSE = 1e-2  # residual on coarse versions: finer, it would not help the next one
-_CYCLES = 2  # cycles of the approximate inverse in a step
-_STEPS, _COARSE_STEPS = 24, 8  # at most; five to ten are usual on the points, three on coarse versions
+_CYCLES = 4  # cycles of the approximate inverse in a step, at most
+_FALL = 3.0  # over what a cycle leaves of a residual, about
+_STEPS, _COARSE_STEPS = 24, 8  # at most; two to six are usual on the points, two on coarse versions
+_BLOCK = 1 << 11  # rows of vectors worked on at one time
 _PATIENCE = 12  # steps after which the block of vectors is widened
 
 
 def coarse_to_fine(
-    matrix: sparse.csr_array, slowest: Floats, count: int, tolerance: float, report: Callable[..., None]
+    matrix: sparse.csr_array,
+    slowest: Floats,
+    count: int,
+    tolerance: float,
+    scale: float,
+    report: Callable[..., None],
 ) -> tuple[Floats, Floats] | None:
     """Return the lowest eigenpairs, or None where coarse versions do not help.
 
@@ -39,6 +48,8 @@ def coarse_to_fine(
     count : int
     tolerance : float
         Largest residual, over the last eigenvalue wanted.
+    scale : float
+        What that eigenvalue counts as at least.
     report : callable
         Called with the fraction done; may raise `Cancelled`.
 
@@ -59,10 +70,17 @@ def coarse_to_fine(
         size = min(max(min(max(beyond, count), 2 * count + _WIDE), flat) + _GUARDS, len(values))
         for number in reversed(range(len(levels))):
             level, finest = levels[number], number == 0
-            start = level.prolongation @ np.ascontiguousarray(vectors[:, : size if finest else 2 * size])
-            start = np.column_stack([start, _random(len(start), max(_RANDOM, count + _RANDOM - start.shape[1]))])
+            start = level.extension @ vectors[:, : size if finest else 2 * size].astype(np.float32)
+            start = smoothed(level, np.zeros_like(start), start, level.steps)
+            guards = _random(len(start), max(_RANDOM, count + _RANDOM - start.shape[1])).astype(np.float32)
+            for _ in range(_FILTERED):
+                guards = solve_roughly(levels[number:], coarsest, guards, np.zeros(guards.shape[1], np.float32), size)
+                guards /= _lengths(guards)
+            start = np.column_stack([start, guards]).astype(np.float64)
             wanted, goal, limit = (count, tolerance, _STEPS) if finest else (size, _COARSE, _COARSE_STEPS)
-            values, vectors, right = refine(levels[number:], coarsest, start, size, wanted, goal, limit, report, finest)
+            values, vectors, right = refine(
+                levels[number:], coarsest, start, size, wanted, goal, scale, limit, report, finest
+            )
             if not finest:
                 level.known = _known(values, vectors, level.mass)
     return (values[:count], vectors[:, :count]) if right else None
@@ -79,6 +97,7 @@ def refine(
     size: int,
     wanted: int,
     tolerance: float,
+    scale: float,
     limit: int,
     report: Callable[..., None],
     final: bool,
@@ -97,7 +116,8 @@ def refine(
         How many the coarse versions gave.
     wanted : int
         How many residuals are to fall to the tolerance; the others to a larger one, up to `_GUARDED`.
-    tolerance : float
+    tolerance, scale : float
+        See `coarse_to_fine`.
     limit : int
         Most steps.
     report : callable
@@ -125,11 +145,11 @@ def refine(
             vectors, image = product(vectors, basis), product(image, basis)
         report()
         dual = _weighed(level.mass, vectors)
-        residual = image - dual * values
-        norms = _lengths(residual)
-        residuals = norms / _scale(values, wanted)
+        residual, norms = _residual(image, dual, values)
+        measure = max(values[wanted - 1], scale)
+        residuals = norms / measure
         # Unless vectors close to the wanted ones are about as exact, these stall, or stand where lower ones belong.
-        beyond = np.clip((values - values[wanted - 1]) / (0.5 * _BEYOND * _scale(values, wanted)), 0.0, 1.0)
+        beyond = np.clip((values - values[wanted - 1]) / (0.5 * _BEYOND * measure), 0.0, 1.0)
         goals = tolerance * (max(_GUARDED, tolerance) / tolerance) ** beyond
         goals[:wanted] = tolerance
         excess = np.max(residuals / goals)
@@ -142,27 +162,25 @@ def refine(
             drift = np.inf  # look again
             continue
         # The rest is in single precision: corrections of a few digits suffice.
-        found = vectors.astype(np.float32)
-        dual = found if level.mass is None else dual.astype(np.float32)
+        found = _single(vectors)
+        dual = found if level.mass is None else _single(dual)
         active = np.flatnonzero(residuals > 0.5 * goals)
-        residual = (residual / norms).astype(np.float32)
-        load, shifts = residual[:, active], values[active].astype(np.float32)
+        load, shifts = np.take(residual, active, axis=1), values[active].astype(np.float32)
+        load /= norms[active].astype(np.float32)
         relative = shifts / np.float32(values[size - 1])
         change = solve_roughly(levels, coarsest, load, relative, size)
-        for _ in range(_CYCLES - 1):
-            change -= product(found, product(dual.T, change))
-            rest = level.rough @ change
-            np.subtract(load, rest, out=rest)
-            rest += _weighed(rough_mass, change) * shifts
-            change += solve_roughly(levels, coarsest, rest, relative, size)
-        change -= product(found, product(dual.T, change))
+        cycles = max(np.ceil(np.log(excess) / np.log(_FALL)), 1.0)  # in as few steps as hold them, of as many each
+        for _ in range(int(np.ceil(cycles / np.ceil(cycles / _CYCLES))) - 1):
+            subtract_product(change, found, product(dual.T, change))
+            change += solve_roughly(levels, coarsest, _rest(level, rough_mass, load, change, shifts), relative, size)
+        subtract_product(change, found, product(dual.T, change))
         change /= _lengths(change)
         report()
         # The best combinations of both, in an orthonormal basis of the changes.
         lengths, basis = eigh(product(change.T, _weighed(rough_mass, change)).astype(np.float64))
         kept = lengths > 1e-5 * lengths[-1]  # the others drown in rounding
         basis = basis[:, kept] / np.sqrt(lengths[kept])
-        coupling = norms[:, None] * product(residual.T, change) @ basis
+        coupling = product(residual.T, change) @ basis
         report()
         changed = level.rough @ change
         own = basis.T @ product(change.T, changed) @ basis
@@ -174,8 +192,39 @@ def refine(
         vectors += product(change, share)
         image += product(changed, share)
         lost = np.linalg.norm(share[:, :wanted], axis=0).max()
-        drift += np.finfo(np.float32).eps * level.top * lost / _scale(values, wanted)
+        drift += np.finfo(np.float32).eps * level.top * lost / measure
     return values, vectors, bool(excess <= 1.0)
+
+
+def _residual(image: Floats, dual: Floats, values: Floats) -> tuple[Array, Floats]:
+    """Return ``image - dual * values`` in single precision, and the lengths of its columns, never zero."""
+    result = np.empty(image.shape, dtype=np.float32)
+
+    def subtract(rows: slice) -> Floats:
+        missed = image[rows] - dual[rows] * values
+        result[rows] = missed
+        return np.einsum("ij,ij->j", missed, missed)
+
+    squares = sum(on_all_cores(subtract, blocks(len(image), _BLOCK)), np.zeros(len(values)))
+    return result, np.sqrt(np.maximum(squares, np.finfo(np.float32).tiny))
+
+
+def _rest(level: Level, mass: sparse.csr_array | None, load: Array, change: Array, shifts: Array) -> Array:
+    """Return ``load - (matrix - shifts * mass) change`` in single precision."""
+    weighed = _weighed(mass, change)
+
+    def subtract(rows: slice, values: Array) -> None:
+        np.subtract(load[rows], values, out=values)
+        values += weighed[rows] * shifts
+
+    return level.rough.product(change, subtract)
+
+
+def _single(vectors: Floats) -> Array:
+    """Return vectors in single precision."""
+    result = np.empty(vectors.shape, dtype=np.float32)
+    on_all_cores(lambda rows: np.copyto(result[rows], vectors[rows], "same_kind"), blocks(len(vectors), _BLOCK))
+    return result
 
 
 def _lengths(vectors: Array) -> Array:
@@ -186,11 +235,6 @@ def _lengths(vectors: Array) -> Array:
 def _weighed(mass: sparse.csr_array | None, vectors: Array) -> Any:
     """Return the product with the mass; None stands for the identity."""
     return vectors if mass is None else mass @ vectors
-
-
-def _scale(values: Floats, wanted: int) -> float:
-    """Return the eigenvalue that residuals are measured by: the last one wanted, or where all are zero, the last."""
-    return values[wanted - 1] if values[wanted - 1] > 1e-9 * values[-1] else max(values[-1], np.finfo(float).tiny)
 
 
 def _random(count: int, columns: int, seed: int = 0) -> Floats:

@@ -38,10 +38,17 @@ def product(left: Array, right: Array) -> Array:
     return result
 
 
-def _multiply(gemm: Callable[..., Array], left: Array, right: Array, **settings: Any) -> Array:
+def subtract_product(result: Array, left: Array, right: Array) -> None:
+    """Compute ``result -= left @ right`` in place, for a contiguous result, (m, n), of the precision of both."""
+    gemm, (m, n) = get_blas_funcs("gemm", (left, right)), result.shape
+    for part in blocks(m, max(1, _WORK // max(1, left.shape[1] * n))):
+        _multiply(gemm, left[part], right, -1.0, beta=1.0, c=result[part].T, overwrite_c=True)
+
+
+def _multiply(gemm: Callable[..., Array], left: Array, right: Array, factor: float = 1.0, **settings: Any) -> Array:
     """Compute the product as the transpose of that of the transposes, since BLAS takes columns, and numpy has rows."""
     (a, flip_a), (b, flip_b) = _in_columns(right), _in_columns(left)
-    return gemm(1.0, a, b, trans_a=flip_a, trans_b=flip_b, **settings).T
+    return gemm(factor, a, b, trans_a=flip_a, trans_b=flip_b, **settings).T
 
 
 def _in_columns(matrix: Array) -> tuple[Array, bool]:

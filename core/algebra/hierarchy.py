@@ -54,10 +54,16 @@ class Rows:
         """Multiply with an array, (m, k), or a sparse one."""
         if sparse.issparse(other):
             return sparse.vstack(list(self.each(lambda rows, part: part @ other)), format="csr")
+        return self.product(other, lambda rows, values: None)
+
+    def product(self, other: Array, change: Callable[[slice, Array], None]) -> Array:
+        """Multiply with an array, (m, k), and change each part of the product, in place, while it is in the cache."""
         result = np.empty((self._count, other.shape[1]), dtype=np.result_type(self._dtype, other.dtype))
 
         def fill(rows: slice, part: sparse.csr_array) -> None:
-            result[rows] = part @ other
+            values = part @ other
+            change(rows, values)
+            result[rows] = values
 
         list(self.each(fill))
         return result
@@ -251,7 +257,7 @@ def solve_roughly(levels: list[Level], last: Known, load: Array, shifts: Array, 
         load = load - product(known.duals, share)
     level = levels[0]
     result: Array = level.extension @ solve_roughly(levels[1:], last, level.restriction @ load, shifts, wanted)
-    _smooth(level, load, result, level.steps)
+    result = smoothed(level, load, result, level.steps)
     if solved is not None:
         result += solved
     return result
@@ -306,19 +312,24 @@ def _cycle(levels: list[Level], inverse: Floats, load: Array) -> Array:
     if not levels:
         return (inverse @ load).astype(np.float32)
     level = levels[0]
-    result = level.steps[0] * load
-    _smooth(level, load, result, level.steps[1:])
-    rest = level.rough @ result
-    np.subtract(load, rest, out=rest)
+    result = smoothed(level, load, level.steps[0] * load, level.steps[1:])
+
+    def subtract(rows: slice, values: Array) -> None:
+        np.subtract(load[rows], values, out=values)
+
+    rest = level.rough.product(result, subtract)
     result += level.extension @ _cycle(levels[1:], inverse, level.restriction @ rest)
-    _smooth(level, load, result, level.steps)
-    return result
+    return smoothed(level, load, result, level.steps)
 
 
-def _smooth(level: Level, load: Array, result: Array, steps: list[Array]) -> None:
-    """Improve a result in place by some steps over the diagonal."""
+def smoothed(level: Level, load: Array, result: Array, steps: list[Array]) -> Array:
+    """Return a result improved by some steps over the diagonal."""
     for step in steps:
-        change = level.rough @ result
-        np.subtract(load, change, out=change)
-        change *= step
-        result += change
+
+        def improve(rows: slice, values: Array, step: Array = step, before: Array = result) -> None:
+            np.subtract(load[rows], values, out=values)
+            values *= step[rows]
+            values += before[rows]
+
+        result = level.rough.product(result, improve)
+    return result

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,7 +12,7 @@ from scipy import sparse
 from scipy.sparse.linalg import ArpackNoConvergence
 from scipy.spatial import cKDTree
 
-from ..algebra import coarse_to_fine, lift_lowest
+from ..algebra import Rows, coarse_to_fine, lift_lowest
 from ..arguments import positive, whole
 from ..errors import SolverError, TooFewPointsError, UnresolvedModesError
 from ..kernel import inverse_ratio, symbol
@@ -77,7 +79,9 @@ def solve_spectrum(
     # In eigenvalues near one, by a power of two: solvers take those below some number for zero, in any unit.
     unit = np.ldexp(1.0, np.frexp(matrix.diagonal().max())[1])
     matrix.data /= unit
-    pairs = coarse_to_fine(matrix, 1.0 / root, count, tolerance, report) if count <= _FEW * len(order) else None
+    weyl = 4.0 * np.pi * count / laplacian.areas.sum() / unit
+    few = count <= _FEW * len(order)
+    pairs = coarse_to_fine(matrix, 1.0 / root, count, tolerance, weyl, report) if few else None
     try:
         values, vectors = pairs or lift_lowest(matrix, count, _cut(laplacian, count) / unit, report)
     except ArpackNoConvergence as error:
@@ -85,8 +89,7 @@ def solve_spectrum(
             f"The eigenvalue solver found {len(error.eigenvalues)} of {count} modes on {n} points. Ask for fewer modes."
         ) from error
     report()
-    scale = max(values[-1], 4.0 * np.pi * count / laplacian.areas.sum() / unit)
-    residuals = np.linalg.norm(matrix @ vectors - vectors * values, axis=0) / scale
+    residuals = _missed(matrix, values, vectors) / max(values[-1], weyl)
     if not residuals.max() <= tolerance:
         raise SolverError(
             f"The eigenvalue solver found {np.sum(residuals <= tolerance)} of {count} modes on {n} points to a residual"
@@ -99,6 +102,17 @@ def solve_spectrum(
     result = np.zeros((n, count))
     result[order] = vectors * np.sign(vectors[first, np.arange(count)])
     return Spectrum(unit * np.maximum(values, 0.0), result, residuals)
+
+
+def _missed(matrix: sparse.csr_array, values: Floats, vectors: Floats) -> Floats:
+    """Return the lengths of ``matrix @ vectors - vectors * values``, (count,)."""
+
+    def subtract(rows: slice, image: Floats) -> None:
+        image -= vectors[rows] * values
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        missed = Rows(matrix, pool, lambda: None).product(vectors, subtract)
+    return np.sqrt(np.einsum("ij,ij->j", missed, missed))
 
 
 def _cut(laplacian: LaplaceBeltrami, count: int) -> float:
