@@ -165,47 +165,51 @@ def _intersect(cuts: Floats, gaussian_curvature: Floats, furthest: Floats | floa
     on; an edge that ends in the origin is open.
     """
     count = len(cuts)
-    cuts = np.concatenate([cuts, np.zeros((count, 1, 2))], axis=1)
-    here = cuts[np.arange(count), np.linalg.norm(cuts, axis=2).argmax(axis=1)]
-    first, same = here, _SAME * np.linalg.norm(here, axis=1)
-    ahead = np.stack([-here[:, 1], here[:, 0]], axis=1)
+    x, y = (np.append(cuts[:, :, axis], np.zeros((count, 1)), axis=1) for axis in range(2))
+    rows = np.arange(count)
+    longest = np.argmax(x * x + y * y, axis=1)
+    here = np.stack([x[rows, longest], y[rows, longest]])
+    first, same = here, _SAME * np.hypot(*here)
+    ahead = np.stack([-here[1], here[0]])
     areas, radius = np.zeros(count), np.zeros(count)
     closed = np.zeros(count, dtype=bool)
-    start = corner = np.zeros((0, 2))
-    rows = np.arange(count)
-    for _ in range(cuts.shape[1] + 1):
-        step = cuts[rows] - here[:, None]
-        length = np.linalg.norm(step, axis=2)
+    start = corner = np.zeros((2, 0))
+    for _ in range(x.shape[1] + 1):
+        step_x, step_y = x - here[0, :, None], y - here[1, :, None]
+        length = np.sqrt(step_x * step_x + step_y * step_y)
         other = length > same[:, None]
-        along = np.einsum("ikc,ic->ik", step, ahead) / np.where(other, length, 1.0)
+        along = step_x * ahead[0, :, None] + step_y * ahead[1, :, None]
+        along /= np.where(other, length, 1.0)
         chosen = np.where(other, along, -np.inf).argmax(axis=1)
         every = np.arange(len(rows))
-        there, ahead = cuts[rows, chosen], step[every, chosen] / length[every, chosen, None]
-        across = here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0]
-        out = across <= _SAME * np.linalg.norm(here, axis=1) * np.linalg.norm(there, axis=1)
+        there = np.stack([x[every, chosen], y[every, chosen]])
+        ahead = np.stack([step_x[every, chosen], step_y[every, chosen]]) / length[every, chosen]
+        across = here[0] * there[1] - here[1] * there[0]
+        out = across <= _SAME * np.hypot(*here) * np.hypot(*there)
         before = corner
-        corner = np.stack([there[:, 1] - here[:, 1], here[:, 0] - there[:, 0]], axis=1)
-        corner /= np.where(out, 1.0, across)[:, None]
-        radius[rows] = np.maximum(radius[rows], np.where(out, 0.0, np.linalg.norm(corner, axis=1)))
-        if not len(before):
+        corner = np.stack([there[1] - here[1], here[0] - there[0]]) / np.where(out, 1.0, across)
+        radius[rows] = np.maximum(radius[rows], np.where(out, 0.0, np.hypot(*corner)))
+        if not before.size:
             start = corner
         else:
             areas[rows] += _triangles(before, corner, gaussian_curvature[rows])
-        done = ~out & (np.linalg.norm(there - first, axis=1) <= same)
+        done = ~out & (np.hypot(*(there - first)) <= same)
         closed[rows[done]] = True
-        areas[rows[done]] += _triangles(corner[done], start[done], gaussian_curvature[rows[done]])
+        areas[rows[done]] += _triangles(corner[:, done], start[:, done], gaussian_curvature[rows[done]])
         left = ~out & ~done
-        rows, here, ahead, corner = rows[left], there[left], ahead[left], corner[left]
-        start, first, same = start[left], first[left], same[left]
+        here = there
+        if not left.all():
+            x, y, rows, same = x[left], y[left], rows[left], same[left]
+            here, ahead, corner, start, first = (values[:, left] for values in (here, ahead, corner, start, first))
         if not len(rows):
             break
     return areas, radius, closed & (radius < furthest)
 
 
 def _triangles(corner: Floats, other: Floats, gaussian_curvature: Floats) -> Floats:
-    """Return the areas of triangles with one corner at the point, on a surface of that curvature."""
-    plane = 0.5 * (corner[:, 0] * other[:, 1] - corner[:, 1] * other[:, 0])
-    squared = np.einsum("ic,ic->i", corner, corner) + np.einsum("ic,ic->i", other, corner + other)
+    """Return the areas of triangles of the point and two corners, (2, k) each, on a surface of that curvature."""
+    plane = 0.5 * (corner[0] * other[1] - corner[1] * other[0])
+    squared = np.sum(corner * corner + other * (corner + other), axis=0)
     # Of the mean squared distance along the edge.
     curved = np.maximum(gaussian_curvature * squared / 3.0, -CURVED) + 1e-12
     return plane * 2.0 * (1.0 - 1.0 / np.sqrt(1.0 + curved)) / curved
