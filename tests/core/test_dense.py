@@ -31,6 +31,17 @@ def test_product_of_parts_of_matrices():
     np.testing.assert_allclose(dense.product(left[5:, 3:15], right[::2][:12, 1:]), left[5:, 3:15] @ right[::2][:12, 1:])
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("work", [1, 1000, 1 << 27])
+def test_a_product_is_subtracted_in_place(monkeypatch, dtype, work):
+    monkeypatch.setattr(dense, "_WORK", work)
+    rng = np.random.default_rng(0)
+    result, left, right = (rng.standard_normal(shape).astype(dtype) for shape in ((90, 4), (90, 7), (7, 4)))
+    expected = result - left @ right
+    dense.subtract_product(result, left, right)
+    np.testing.assert_allclose(result, expected, rtol=0, atol=100.0 * np.finfo(dtype).eps)
+
+
 @pytest.mark.parametrize("size", [1, 3, 6])
 def test_inverses_of_many_small_matrices(monkeypatch, size):
     monkeypatch.setattr(dense, "_BLOCK", 7)

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 import core
 from benchmarks.samplings import random_sphere
 from core.algebra import solvers
-from core.algebra.hierarchy import approximate_inverse
+from core.algebra.hierarchy import Rows, approximate_inverse
 from core.algebra.solvers import conjugate_gradients, solve_symmetric
 
 CLOUDS = ["another random sphere", "coarse torus", "random square", "density jump"]
@@ -163,3 +163,20 @@ def test_it_can_be_stopped_at_any_time(operators, coarse):
 
         with pytest.raises(core.Cancelled):
             solve_symmetric(matrix, load, progress=stop)
+
+
+def test_a_product_is_changed_part_by_part(monkeypatch):
+    monkeypatch.setattr("core.algebra.hierarchy.PART", 50)
+    rng = np.random.default_rng(0)
+    matrix, other, load = (
+        sparse.random_array((60, 40), density=0.2, rng=rng).tocsr(),
+        rng.random((40, 3)),
+        rng.random((60, 3)),
+    )
+
+    def subtract(rows, values):
+        np.subtract(load[rows], values, out=values)
+
+    with ThreadPoolExecutor(2) as pool:
+        found = Rows(matrix, pool, silent).product(other, subtract)
+    np.testing.assert_allclose(found, load - matrix @ other, atol=1e-14)
