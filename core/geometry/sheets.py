@@ -75,10 +75,13 @@ def on_sheet(
     cosine : ndarray, (k, views)
         Of the angle between the normals.
     """
-    chord = nearest.points[other] - nearest.points[rows, None]
-    cosine = np.einsum("ikc,ic->ik", normals[other], normals[rows])
-    left = np.einsum("ikc,ic->ik", chord, normals[rows])
-    right = np.einsum("ikc,ikc->ik", chord, normals[other])
+    cosine, left, right = np.zeros((3, *other.shape))
+    for place, normal in zip(nearest.points.T, normals.T, strict=True):
+        here, there = normal[rows, None], normal[other]
+        chord = place[other] - place[rows, None]
+        cosine += there * here
+        left += chord * here
+        right += chord * there
     return same_sheet(left, right, cosine, distance, nearest.spacing[rows, None], close), cosine
 
 
