@@ -17,6 +17,7 @@ from .patches import Patch, divide_pairs
 Ends: TypeAlias = Sequence[Sequence[Floats]] | Floats  # quantities of pairs at their first and second points
 
 _BLOCK = 1 << 22  # neighbour candidates held at one time while the pairs are collected
+_GROUPS = 4  # of points with as many candidates, for each doubling of these
 
 
 @dataclass(frozen=True)
@@ -108,35 +109,28 @@ def find_pairs(tree: cKDTree, lengths: Floats, report: Report = lambda: None) ->
         Each pair once, ordered by the first.
     distance : ndarray, (pairs,)
     """
-    n = tree.n
     radii = SUPPORT * lengths
-    # The search starts from what an even sample holds; rows that reach further are asked again, for twice as many.
-    sample = slice(None, None, max(1, n // 1000))
-    spacing = tree.query(tree.data[sample], k=[min(31, n)], workers=-1)[0][:, 0]
-    count = int(min(max(40.0 * np.median(radii[sample] / spacing) ** 2, 16), n))
-    pending = np.arange(n)
-    found: tuple[list[Array], ...] = [], [], []
-    while len(pending):
-        unfinished = []
-        for rows in np.array_split(pending, len(pending) * count // _BLOCK + 1):
+    # Counted first, which takes little, so that none is searched for in vain: points with as many are asked together.
+    count = tree.query_ball_point(tree.data, radii, workers=-1, return_length=True)
+    group = np.ceil(np.log2(count) * _GROUPS).astype(np.int16)
+    order = np.argsort(group, kind="stable")
+    many, found = np.zeros(tree.n, dtype=np.int64), []
+    for members in np.split(order, np.flatnonzero(np.diff(group[order])) + 1):
+        most = int(count[members].max())
+        for rows in np.array_split(members, len(members) * most // _BLOCK + 1):
             report()
-            distance, column = tree.query(tree.data[rows], k=count, workers=-1)
-            complete = (distance[:, -1] > radii[rows]) | (count == n)
-            unfinished.append(rows[~complete])
-            rows, distance, column = rows[complete], distance[complete], column[complete]
+            distance, column = tree.query(tree.data[rows], k=np.arange(1, most + 1), workers=-1)
             reach, other = radii[rows, None], radii[column]
             # A pair is kept by the end that reaches further, which always sees it.
             kept = (reach > other) | ((reach == other) & (rows[:, None] < column))
             kept &= distance <= 0.5 * (reach + other)
-            found[0].append(np.repeat(rows.astype(np.int32), np.count_nonzero(kept, axis=1)))
-            found[1].append(column[kept].astype(np.int32))
-            found[2].append(distance[kept])
-        pending, count = np.concatenate(unfinished), min(2 * count, n)
-    rounds = []
-    for parts in found:
-        rounds.append(np.concatenate(parts))
-        parts.clear()  # as much memory as the next ones take
-    if np.any(np.diff(rounds[0]) < 0):  # later rounds answered for earlier rows
-        order = np.argsort(rounds[0], kind="stable")
-        rounds = [part[order] for part in rounds]
-    return rounds
+            many[rows] = np.count_nonzero(kept, axis=1)
+            found.append((rows, column[kept].astype(np.int32), distance[kept]))
+    start = np.cumsum(many) - many
+    first = np.repeat(np.arange(tree.n, dtype=np.int32), many)
+    second, distance = np.empty(len(first), dtype=np.int32), np.empty(len(first))
+    while found:
+        rows, column, length = found.pop()
+        place = np.arange(len(column)) + np.repeat(start[rows] - np.cumsum(many[rows]) + many[rows], many[rows])
+        second[place], distance[place] = column, length
+    return [first, second, distance]
