@@ -16,7 +16,7 @@ def _modules():
     from .operators.deform import bake, live
     from .operators.deform import tools as deform
     from .operators.files import command, exporting, importing
-    from .operators.objects import counting, motion, notices, settings
+    from .operators.objects import counting, motion, motion_files, notices, settings
     from .operators.running import cache, job
     from .ui import (
         applications,
@@ -43,6 +43,7 @@ def _modules():
         cache,
         counting,
         motion,
+        motion_files,
         job,
         *_within(tools),
         deform,

@@ -2,9 +2,11 @@
 
 import bpy
 
+from ..operators.objects import motion_files
 from ..operators.objects.quantities import STRAY
 from .measures import draw_measures
 from .panel import ReadyPanel, draw_tools
+from .wrapping import draw_text
 
 
 class ToolPanel(ReadyPanel):
@@ -50,6 +52,24 @@ class MESHFREE_PT_simulate(ToolPanel, bpy.types.Panel):
     """Heat, waves, patterns and fronts along the surface, frame by frame"""
 
     bl_label = "Simulate"
+
+    def draw(self, context):
+        draw_tools(self.layout, self.bl_label)
+        _draw_frames(self.layout, context)
+
+
+def _draw_frames(layout, context):
+    """Draw what frames take on disk: those on show, and former ones that stay until the file is closed."""
+    shown, former = motion_files.frames_of(context.object), motion_files.former()
+    column = layout.column(align=True)
+    if shown is not None:
+        draw_text(column, context, f"Frames on disk: {_megabytes([shown])}")
+    if former:
+        draw_text(column, context, f"Former ones, for Undo: {_megabytes(former)}, until this file is closed")
+
+
+def _megabytes(paths):
+    return f"{motion_files.size_of(paths) / 2**20:.1f} MB"
 
 
 class MESHFREE_PT_segment(ToolPanel, bpy.types.Panel):

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import bpy
 import numpy as np
 
+from .animation import curves
 from .attributes import remove_numbered, write_attribute
 from .modifiers import MOTION_TAG, is_display, is_motion, new_group, set_input
 from .node_trees import TreeBuilder
@@ -21,7 +22,9 @@ _INPUTS = (
 
 
 class Formula(NamedTuple):
-    """A motion as a sum of modes, each by a function of the time from 0 at the first frame to 1 at the last.
+    """A motion as a sum of modes, with the time from 0 at the first frame of the scene to 1 at the last.
+
+    Each start adds to the amplitude of a mode its share times a function of the time since then.
 
     Attributes
     ----------
@@ -29,16 +32,32 @@ class Formula(NamedTuple):
         Of nodes: ``cos(rate * time)``, or ``exp(rate * time)``.
     rates : ndarray, (k,)
     modes : ndarray, (n, k)
-        What each mode adds at the time zero.
+    starts : ndarray, (j,)
+        Times, ascending.
+    shares : ndarray, (j, k)
     """
 
     function: str
     rates: np.ndarray
     modes: np.ndarray
+    starts: np.ndarray
+    shares: np.ndarray
+
+    @property
+    def is_single(self) -> bool:
+        """Whether all starts at the time zero, so that nodes need no more than the function."""
+        return len(self.starts) == 1 and self.starts[0] == 0.0
+
+    def amplitudes(self, time: float):
+        """Return the amplitudes of the modes at a time, (k,)."""
+        begun = self.starts <= max(time, 0.0)
+        since = max(time, 0.0) - self.starts[begun]
+        function = {"COSINE": np.cos, "EXPONENT": np.exp}[self.function]
+        return np.sum(self.shares[begun] * function(np.multiply.outer(since, self.rates)), axis=0)
 
     def at(self, time: float):
         """Return the motion at a time, (n,)."""
-        return self.modes @ {"COSINE": np.cos, "EXPONENT": np.exp}[self.function](self.rates * max(time, 0.0))
+        return self.modes @ self.amplitudes(time)
 
 
 def mode_name(number: int) -> str:
@@ -71,11 +90,15 @@ def show_motion(obj, height: float, normals, formula, first: int, frames: int):
         modifier = obj.modifiers.new(NAME, "NODES")
         others = [item for item in obj.modifiers if item != modifier]
         obj.modifiers.move(len(others), len([item for item in others if not is_display(item)]))
-    for number, mode in enumerate(() if formula is None else formula.modes.T, 1):
-        write_attribute(obj.data, mode_name(number), mode)
+    if formula is not None:
+        at_start = formula.shares[0] if formula.is_single else np.ones(len(formula.rates))
+        for number, mode in enumerate((formula.modes * at_start).T, 1):
+            write_attribute(obj.data, mode_name(number), mode)
     if height:
         write_attribute(obj.data, NORMAL, normals)
     modifier.node_group = _new_group(formula, bool(height))
+    if formula is not None and not formula.is_single:
+        _key_amplitudes(modifier.node_group, formula, first, frames)
     scale = np.linalg.det(metric(obj)) ** (1.0 / 6.0)  # the metric has squares of lengths
     for name, value in ((_HEIGHT, float(height / scale)), (_FIRST, first), (_FRAMES, max(frames - 1, 1))):
         set_input(modifier, name, value)
@@ -87,7 +110,8 @@ def _new_group(formula, displaces):
     given = tree.node("NodeGroupInput").outputs
     geometry = given["Geometry"]
     if formula is not None:
-        geometry = tree.store(geometry, MOTION, _sum(tree, formula, _time(tree, given)), "FLOAT")
+        shares = _functions(tree, formula, given) if formula.is_single else _keyed(tree, formula)
+        geometry = tree.store(geometry, MOTION, _sum(tree, shares), "FLOAT")
     if displaces:
         size = tree.math("MULTIPLY", tree.attribute(MOTION, "FLOAT"), given[_HEIGHT])
         offset = tree.node("ShaderNodeVectorMath", tree.attribute(NORMAL), Scale=size, operation="SCALE")
@@ -102,16 +126,47 @@ def _time(tree, given):
     return tree.math("DIVIDE", tree.math("MAXIMUM", since, 0.0), given[_FRAMES])
 
 
-def _sum(tree, formula, time):
-    """Add nodes for the sum of all modes at a time; return the last one."""
+def _functions(tree, formula, given):
+    """Add nodes for the function of the time of each mode, and return them."""
+    time = _time(tree, given)
+    return [tree.math(formula.function, tree.math("MULTIPLY", time, float(rate))) for rate in formula.rates]
+
+
+def _keyed(tree, formula):
+    """Add nodes for the amplitude of each mode, which have keyframes, and return them."""
+    return [tree.node("ShaderNodeValue", name=mode_name(number + 1)) for number in range(len(formula.rates))]
+
+
+def _sum(tree, shares):
+    """Add nodes for the sum of all modes, each times a share; return the last one."""
     total = 0.0
-    for number, rate in enumerate(formula.rates, 1):
-        share = tree.math(formula.function, tree.math("MULTIPLY", time, float(rate)))
+    for number, share in enumerate(shares, 1):
         total = tree.math("MULTIPLY_ADD", share, tree.attribute(mode_name(number), "FLOAT"), total)
     return total
 
 
+def _key_amplitudes(group, formula, first, frames):
+    """Give the amplitudes of the modes a keyframe at each frame of the scene, straight lines between them."""
+    numbers = np.arange(frames)
+    values = np.array([formula.amplitudes(number / max(frames - 1, 1)) for number in numbers])
+    sockets = [group.nodes[mode_name(number + 1)].outputs[0] for number in range(len(formula.rates))]
+    for socket in sockets:  # which makes its F-curve, wherever a version of Blender keeps it
+        socket.keyframe_insert("default_value", frame=first)
+    by_path = {curve.data_path: curve for curve in curves(group)}
+    for socket, of_mode in zip(sockets, values.T, strict=True):
+        points = by_path[socket.path_from_id("default_value")].keyframe_points
+        points.add(frames - len(points))
+        points.foreach_set("co", np.column_stack([first + numbers, of_mode]).astype(np.float32).reshape(-1))
+        for point in points:
+            point.interpolation = "LINEAR"
+        by_path[socket.path_from_id("default_value")].update()
+
+
 def forget_groups():
-    """Remove the nodes of motions that nothing uses any more."""
+    """Remove the nodes of motions that nothing uses any more, with their keyframes."""
     for group in [item for item in bpy.data.node_groups if MOTION_TAG in item and not item.users]:
+        animation = group.animation_data
+        action = animation and animation.action
         bpy.data.node_groups.remove(group)
+        if action is not None and not action.users:
+            bpy.data.actions.remove(action)

@@ -77,7 +77,7 @@ def test_a_wave_runs_as_far_as_it_should(cloud):
 
 
 def test_patterns_grow_from_the_sources(monkeypatch):
-    monkeypatch.setattr(part("operators.tools.simulate"), "_PATTERN_TIME", 1000.0)
+    monkeypatch.setattr(part("operators.running.motions"), "_PATTERN_TIME", 1000.0)
     obj = add_object(sphere_points(700))
     add_group(obj, "Source", [7])
     bpy.context.scene.frame_end = 20
@@ -90,7 +90,7 @@ def test_patterns_grow_from_the_sources(monkeypatch):
 
 
 def test_a_reaction_that_dies_out_is_told(cloud, monkeypatch):
-    monkeypatch.setattr(part("operators.tools.simulate"), "_PATTERN_TIME", 300.0)
+    monkeypatch.setattr(part("operators.running.motions"), "_PATTERN_TIME", 300.0)
     bpy.ops.meshfree.simulate(kind="REACTION", distance=0.2)
     assert frames(cloud)[-1].max() < 0.05
     assert any("died out" in notice.text for notice in cloud.meshfree.notices)
@@ -105,15 +105,6 @@ def test_a_budget_leaves_frames_out_and_says_so(cloud, monkeypatch):
     bpy.context.scene.frame_set(4)
     kept = frames(cloud)
     assert_allclose(attribute(cloud, "lb_motion"), (2.0 * kept[0] + kept[1]) / 3.0, atol=1e-6)
-
-
-def test_a_new_motion_takes_the_place_of_the_old_file(cloud):
-    bpy.ops.meshfree.simulate(kind="FRONT")
-    old = Path(bpy.path.abspath(cloud.meshfree.motion_file))
-    bpy.ops.meshfree.simulate(kind="FRONT", width=0.1)
-    assert not old.exists()
-    assert len(list(old.parent.iterdir())) == 1
-    assert cloud.meshfree.motion_file.startswith("//motion")
 
 
 def test_files_of_others_stay(cloud, tmp_path):
@@ -172,7 +163,7 @@ def test_a_failure_at_the_end_leaves_an_earlier_motion_as_it_was(cloud, monkeypa
     def fail(*_):
         raise MemoryError
 
-    monkeypatch.setattr(tool, "_remove_old", fail)
+    monkeypatch.setattr(tool, "forget_groups", fail)
     with refused(cloud, "memory is used up"):
         bpy.ops.meshfree.simulate(kind="HEAT", keep="MODES", modes=9, width=0.8, show=False)
     assert_allclose(evaluated_motion(cloud), before, atol=1e-6)
@@ -241,33 +232,6 @@ def test_modes_play_without_the_extension(cloud, extension):
         assert np.abs(evaluated_motion(cloud) - first).max() > 0.1
     finally:
         handler.attach()
-
-
-def test_an_object_that_touches_the_surface_starts_heat_where_it_is(cloud):
-    cloud.location, cloud.scale = (1.0, 2.0, 3.0), (2.0, 2.0, 2.0)
-    ball = bpy.data.objects.new("Ball", None)
-    bpy.context.scene.collection.objects.link(ball)
-    for frame, side in ((5, 1.0), (7, 8.0), (9, -1.0)):  # it touches, leaves, and touches on the other side
-        ball.location = (1.0 + 2.0 * side, 2.0, 3.0)
-        ball.keyframe_insert("location", frame=frame)
-    bpy.context.scene.frame_set(4)
-    cloud.vertex_groups.clear()
-    bpy.ops.meshfree.simulate(kind="HEAT", toucher="Ball", width=0.8, distance=1.0, folder="")
-    assert bpy.context.scene.frame_current == 4
-    kept, x = frames(cloud), local_points(cloud)[:, 0]
-    assert kept[2][x > 0.95].max() > 0.9
-    assert kept[5][x < 0.0].max() < 0.01
-    assert kept[6][x < -0.95].max() > 0.9
-    assert 0.0 < kept[6][x > 0.95].max() < 0.9
-
-
-def test_an_object_that_touches_nothing_is_refused(cloud):
-    far = add_object(sphere_points(10) + 50.0, "Far")
-    bpy.context.view_layer.objects.active = cloud
-    for name, text in {"Far": "comes within .* of no point", "Cloud": "is the object itself", "X": "not in"}.items():
-        with refused(cloud, text):
-            bpy.ops.meshfree.simulate(kind="WAVE", toucher=name)
-    assert far.name == "Far"
 
 
 def test_the_command_line_gives_the_last_frame(run, core, tmp_path):  # noqa: F811

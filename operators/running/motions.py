@@ -1,0 +1,272 @@
+"""What moves along the surface: heat, waves, patterns and fronts, frame by frame, or as modes."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ... import core
+from ...core import PointCloudError
+from ..objects.motion_nodes import Formula
+from ..objects.result import length_text
+from . import cache
+
+SPOT = 10.0  # smoothing lengths in the size of a pattern: finer ones are not resolved, and die out
+_WIDTH = 6.0  # smoothing lengths: a pulse that the points resolve
+_ACROSS = 12.0  # patterns of automatic size across the root of the area, at most
+_SEED = 0.4  # of that size, around the sources: where a reaction starts
+_PATTERN_TIME = 5000.0  # units of time in which patterns cover the surface, over all frames
+_LONGEST = 5.0  # of these, in one step of a reaction
+_EDGE = math.exp(-1.0)  # of a pulse, at its width
+_FAR = 6.0  # widths from which a pulse is nothing
+_FADED = 0.4  # height of a wave that has left its pulse, over that
+
+
+class Chosen(NamedTuple):
+    """The settings of a motion, with zero for automatic lengths.
+
+    Attributes
+    ----------
+    kind : {"HEAT", "WAVE", "REACTION", "FRONT"}
+    sources : ndarray, (n,) bool
+        Where it begins; where it ever does, if something touches the points.
+    count, step : int
+        Frames of the scene, and how many are from one that is kept to the next.
+    distance, width : float
+    pattern : {"spots", "stripes"}
+    places : list of ndarray (k, 3), or None
+        Of what touches the points, for each frame of the scene.
+    touched : list of ndarray (k,) int, or None
+        The points there, for each frame that is kept: also those touched since the one before.
+    """
+
+    kind: str
+    sources: np.ndarray
+    count: int
+    step: int
+    distance: float
+    width: float
+    pattern: str
+    places: list | None = None
+    touched: list | None = None
+
+    @property
+    def kept(self) -> int:
+        """How many frames are kept."""
+        return -(-(self.count - 1) // self.step) + 1
+
+    @property
+    def share(self) -> float:
+        """Of the time of all frames, from one that is kept to the next."""
+        return self.step / max(self.count - 1, 1)
+
+    def starts(self, number: int):
+        """Return the points where something begins at a frame that is kept, (k,) int."""
+        if self.touched is not None:
+            return self.touched[number] if number < len(self.touched) else np.arange(0)
+        return np.flatnonzero(self.sources) if number == 0 else np.arange(0)
+
+
+class InModes(NamedTuple):
+    """A motion as modes.
+
+    Attributes
+    ----------
+    formula : Formula
+    low, high : float
+        Range of its values; without a touching object that of the first frame.
+    last : float
+        The largest size on show in the end, about: waves are lower once they have left their pulse.
+    held : float
+        Share of the pulses that the modes hold.
+    distance : float
+        How far it went.
+    """
+
+    formula: Formula
+    low: float
+    high: float
+    last: float
+    held: float
+    distance: float
+
+
+def find_touched(laplacian, chosen) -> Chosen:
+    """Return the settings with the points that are touched: the nearest ones of places that are not too far off."""
+    points, reach = laplacian.points, _width(laplacian, chosen)
+    places = np.concatenate(chosen.places)
+    rows = core.geometry.nearest_rows(points, places)
+    near = (np.linalg.norm(points[rows] - places, axis=1) <= reach) & (laplacian.component[rows] >= 0)
+    if not near.any():
+        raise PointCloudError(
+            f"The Touching Object comes within {length_text(reach)} of no point in any frame. Move it nearer, or raise"
+            " Width."
+        )
+    of_scene = np.repeat(np.arange(len(chosen.places)), [len(one) for one in chosen.places])
+    frame = -(-of_scene // chosen.step)
+    touched = [np.unique(rows[near & (frame == number)]) for number in range(chosen.kept)]
+    return chosen._replace(sources=np.isin(np.arange(len(points)), rows[near]), touched=touched)
+
+
+def frame_rows(laplacian, chosen, progress):
+    """Simulate frame by frame.
+
+    Returns
+    -------
+    iterator of ndarray, (n,)
+        The frames that are kept, without end.
+    float
+        How far the motion goes, or the size of a pattern.
+    """
+    return {"HEAT": _heat, "WAVE": _wave, "REACTION": _reaction, "FRONT": _front}[chosen.kind](
+        laplacian, chosen, progress
+    )
+
+
+def in_modes(laplacian, chosen, count, progress) -> InModes:
+    """Compute heat or a wave as a number of modes.
+
+    Each touch drives the modes by what it adds to the motion as they hold it, projected onto them: so many numbers for
+    each touch, and a formula of the time since then.
+    """
+    areas, spectrum = laplacian.areas, cache.lowest_modes(laplacian, count, progress)
+    distance, modes = _reach(laplacian, chosen), spectrum.eigenvectors
+    if chosen.kind == "WAVE":
+        function, rates = "COSINE", distance * np.sqrt(spectrum.eigenvalues)
+    else:
+        function, rates = "EXPONENT", -0.25 * distance * distance * spectrum.eigenvalues
+    formula = Formula(function, rates, modes, np.zeros(0), np.zeros((0, len(rates))))
+    ranges, held, whole = [], 0.0, 0.0
+    for number in range(chosen.kept if chosen.touched is not None else 1):
+        progress("Frames", number / chosen.kept)
+        time = number * chosen.share
+        now, pulse = formula.at(time), _pulse(laplacian, chosen, chosen.starts(number), progress)
+        if pulse is not None:
+            added = (areas * (_pushed(now, pulse) - now)) @ modes
+            starts, shares = np.append(formula.starts, time), np.concatenate([formula.shares, [added]])
+            formula = formula._replace(starts=starts, shares=shares)
+            now = now + modes @ added
+            held += float(np.sum(((areas * pulse) @ modes) ** 2))
+            whole += float(np.sum(areas * pulse**2))
+        ranges.append((now.min(), now.max()))
+    low, high = np.min(ranges, axis=0)[0], np.max(ranges, axis=0)[1]
+    last = high
+    if chosen.kind == "WAVE":
+        last = _FADED * high if chosen.touched is None else np.abs(ranges[len(ranges) // 2 :]).max()
+    return InModes(formula, low, high, last, held / whole, distance)
+
+
+def _reach(laplacian, chosen):
+    """Return how far heat spreads, or waves and fronts run, within all frames."""
+    return chosen.distance or {"HEAT": 0.5, "WAVE": 1.0, "FRONT": 1.0}[chosen.kind] * _size(laplacian)
+
+
+def _size(laplacian):
+    known = laplacian.component >= 0
+    return float(np.linalg.norm(np.ptp(laplacian.points[known], axis=0)))
+
+
+def _width(laplacian, chosen):
+    return chosen.width or _WIDTH * float(np.median(laplacian.smoothing_lengths))
+
+
+def _pulse(laplacian, chosen, rows, progress):
+    """Return 1 at points, and less around them: one point alone would be less than the points resolve. None for none.
+
+    A point that is left out of the operator starts nothing.
+    """
+    rows = rows[laplacian.component[rows] >= 0] if chosen.touched is not None else rows
+    if not len(rows):
+        return None
+    width = _width(laplacian, chosen)
+    away = cache.geodesics(laplacian, progress).distance(rows, limit=_FAR * width, progress=progress)
+    return np.exp(-((away / width) ** 2))
+
+
+def _pushed(values, pulse):
+    """Return values that are raised to a pulse where they are less; those below zero only as far as it reaches."""
+    return np.maximum(values, pulse + (1.0 - pulse) * np.minimum(values, 0.0))
+
+
+def _heat(laplacian, chosen, progress):
+    distance = _reach(laplacian, chosen)
+    heat = core.Heat(laplacian, 0.25 * distance * distance * chosen.share, progress=progress)
+
+    def begin(state, number):
+        pulse = _pulse(laplacian, chosen, chosen.starts(number), progress)
+        return state if pulse is None else _pushed(state, pulse)
+
+    return _advance(heat, np.zeros(len(laplacian.points)), begin, lambda state: state), distance
+
+
+def _wave(laplacian, chosen, progress):
+    distance = _reach(laplacian, chosen)
+    wave = core.Wave(laplacian, chosen.share, distance, progress=progress)
+
+    def begin(state, number):
+        pulse = _pulse(laplacian, chosen, chosen.starts(number), progress)
+        return state if pulse is None else (_pushed(state[0], pulse), state[1])
+
+    nothing = np.zeros(len(laplacian.points))
+    return _advance(wave, (nothing, nothing), begin, lambda state: state[0]), distance
+
+
+def _reaction(laplacian, chosen, progress):
+    known = laplacian.component >= 0
+    resolved = SPOT * float(np.median(laplacian.smoothing_lengths[known]))
+    automatic = max(resolved, math.sqrt(float(laplacian.areas[known].sum())) / _ACROSS)
+    size, time = chosen.distance or automatic, _PATTERN_TIME * chosen.share
+    steps = math.ceil(time / _LONGEST)
+    kind = core.ReactionDiffusion
+    reaction = kind.of_pattern(laplacian, time / steps, chosen.pattern, size, progress=progress)
+    chosen = chosen._replace(width=_SEED * size)  # a single point would fade before it reacts
+
+    def begin(state, number):
+        pulse = _pulse(laplacian, chosen, chosen.starts(number), progress)
+        if pulse is None:
+            return state
+        inside = pulse > _EDGE
+        return np.where(inside, 0.0, state[0]), np.where(inside, 1.0, state[1])
+
+    start = np.ones(len(laplacian.points)), np.zeros(len(laplacian.points))
+    return _advance(reaction, start, begin, lambda state: state[1], steps), size
+
+
+def _advance(motion, state, begin, part, steps=1):
+    """Yield a part of the state at each frame, after what begins there."""
+    number = 0
+    while True:
+        state = begin(state, number)
+        yield part(state)
+        for _ in range(steps):
+            state = motion.advance(state)
+        number += 1
+
+
+def _front(laplacian, chosen, progress):
+    """Frames are 1 behind the front and 0 before it.
+
+    A front arrives where the time of a touch and that of the way from there, together, are the least of all touches.
+    """
+    geodesics, width = cache.geodesics(laplacian, progress), _width(laplacian, chosen)
+    arrival = np.full(len(laplacian.points), np.inf)  # how far the front has travelled by then
+    if chosen.touched is None:
+        arrival = geodesics.distance(chosen.sources, progress=progress)
+        far = chosen.distance or float(arrival[np.isfinite(arrival)].max())
+    else:
+        far = _reach(laplacian, chosen)
+
+    def frames():
+        number, last = 0, far * chosen.share * (chosen.kept - 1)
+        while True:
+            travelled = far * chosen.share * number
+            rows = np.arange(0) if chosen.touched is None else chosen.starts(number)
+            rows = rows[arrival[rows] > travelled]  # others are behind the front, which adds nothing
+            if len(rows):
+                left = max(last - travelled, 0.0) + width
+                away = geodesics.distance(rows, limit=left, progress=progress)
+                np.minimum(arrival, travelled + away, out=arrival)
+            yield np.clip(1.0 + (travelled - arrival) / width, 0.0, 1.0)
+            number += 1
+
+    return frames(), far
