@@ -6,10 +6,10 @@ import bpy
 
 from ..operators.objects.parts import are_outdated, kept_rows
 from ..operators.objects.quantities import quantity
+from ..operators.objects.units import attribute_power, unit
 from ..operators.registration import Registration, Row
 from ..operators.running.ready import ReadyOperator
 from ..operators.tools.measure_live import followed
-from .units import attribute_power, unit
 from .wrapping import beside_or_below, draw_text, split_properties
 
 _SHOWN = 8  # parts in the panel

@@ -86,6 +86,7 @@ def _draw_export(self, _context):
     layout.operator("meshfree.export_operator", text="Laplacian and Modes (.npz)")
     layout.operator("meshfree.export_eigenvalues", text="Eigenvalues (.csv)")
     layout.operator("meshfree.export_measures", text="Measures (.csv)")
+    layout.operator("meshfree.export_profile", text="Profile (.csv/.svg)")
 
 
 class MESHFREE_FH_points(bpy.types.FileHandler):

@@ -10,10 +10,10 @@ from ..core import PointCloudError
 from ..operators.deform.binding import handled_object
 from ..operators.objects.attributes import mode_number
 from ..operators.objects.result import read_eigenvalues
+from ..operators.objects.units import EIGENVALUE_POWER, unit
 from . import canvas, plots
 from .display import find_display, is_in_solid, range_node, shown_attribute, shown_values, without_unreached
 from .scale import shown_scale
-from .units import EIGENVALUE_POWER, unit
 from .value_range import histogram
 
 _GAP = 10.0  # between pictures, and to the border

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from ..operators.objects.ticks import round_ticks, tick_texts
 from .canvas import DIM, WHITE, Picture
 from .colormaps import to_display
-from .ticks import round_ticks, tick_texts
 
 HEIGHT = 230.0
 _EDGE = 12.0  # between the plate's border and what is on it

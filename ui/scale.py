@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+from ..operators.objects.ticks import round_ticks, tick_texts
+from ..operators.objects.units import attribute_power, unit
 from .display import (
     color_node,
     find_material,
@@ -14,8 +16,6 @@ from .display import (
     step_colors,
 )
 from .materials import CHECKER, direction_color, is_checkered
-from .ticks import round_ticks, tick_texts
-from .units import attribute_power, unit
 
 _DIRECTIONS = {
     "+X": (1, 0, 0),

@@ -11,7 +11,8 @@ from ...core.files import numbered_files
 from .. import registration
 from ..objects.groups import SOURCE
 from .bending import Deform, SplatInfo
-from .tool_verbs import AlignWith, AlongCurve, CompareWith, Frames, FromSources, MeasureFile, Mesh, Orient, Section
+from .measure_verbs import MeasureFile, ProfileBetween, Section
+from .tool_verbs import AlignWith, AlongCurve, CompareWith, Frames, FromSources, Mesh, Orient
 from .verbs import Analyze, Apply
 
 _OWN = {
@@ -23,6 +24,7 @@ _OWN = {
     "orient_normals": Orient,
     "simulate": Frames,
     "cross_section": Section,
+    "profile": ProfileBetween,
 }
 _handles = []
 
@@ -40,7 +42,8 @@ def detach():
 
 def make_verbs():
     """Return all verbs: the analysis, tools in the order of the menu, and those without an object."""
-    tools = [tool for group in registration.groups("menu", "Object") for tool in group if tool.verb]
+    groups = [group for home in ("Object", "Points") for group in registration.groups("menu", home)]
+    tools = [tool for group in groups for tool in group if tool.verb]
     return [Analyze(), *map(_verb, tools), SplatInfo(), Deform()]
 
 
@@ -102,7 +105,7 @@ def _parse(argv):
         chosen.error(str(error))
     if arguments.out is not None and len(arguments.inputs) > 1:
         chosen.error("--out takes one input; use --out-dir for many")
-    outputs = [_output_path(path, arguments) for path in arguments.inputs]
+    outputs = [path for one in arguments.inputs for path in _outputs(verb, one, arguments)]
     if arguments.out_dir is not None and len(set(outputs)) < len(outputs):
         chosen.error("some inputs have the same name and would overwrite each other in --out-dir")
     return verb, arguments
@@ -133,10 +136,17 @@ def _output_path(path, arguments):
     return arguments.out
 
 
+def _outputs(verb, path, arguments):
+    """Return the paths of all files that are written for an input."""
+    output = _output_path(path, arguments)
+    return [] if output is None else [output, *verb.beside(output, arguments)]
+
+
 def _process(verb, path, arguments) -> dict:
     """Process one file, write its output, and return what to print."""
     output = _output_path(path, arguments)
     for read in (path, *(Path(getattr(arguments, name)) for name in verb.reads)):
-        if output is not None and output.resolve() == read.resolve():
-            raise PointCloudError(f"The output {output} would overwrite its input. Choose another name.")
+        for written in _outputs(verb, path, arguments):
+            if written.resolve() == read.resolve():
+                raise PointCloudError(f"The output {written} would overwrite its input. Choose another name.")
     return {**verb.run(path, arguments, output), "output": None if output is None else str(output)}

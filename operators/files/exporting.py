@@ -23,8 +23,9 @@ from ..running.job import JobOperator
 from ..running.ready import reporting
 from ..tools.splats import SplatOperator
 from .objects import analysis_arrays, file_filter, point_table, save_arrays
-from .rows import write_rows
+from .rows import write_rows, write_text
 from .splats import splats_in_world, splats_to_write
+from .svg import profile_picture
 
 
 class ExportOperator(JobOperator, ExportHelper):
@@ -221,8 +222,39 @@ class MESHFREE_OT_export_measures(ExportOperator, bpy.types.Operator):
         name, rows = obj.name, kept_rows(obj)
 
         def write(path, progress):
-            write_rows(path, rows)
+            write_rows(path, [row.record() for row in rows])
             return f"{name}: {len(rows)} parts written to {path.name}"
+
+        return write
+
+
+class MESHFREE_OT_export_profile(ExportOperator, bpy.types.Operator):
+    """Export the last profile of the active object: its table as a CSV file, or a small picture as an SVG file"""
+
+    bl_idname = "meshfree.export_profile"
+    bl_label = "Export Profile"
+    works_in = ("OBJECT", "EDIT")
+    filename_ext = ".csv"
+    check_extension = None  # of two
+
+    filter_glob: file_filter(".csv", ".svg")
+
+    @classmethod
+    def obstacle(cls, context):
+        reason = super().obstacle(context)
+        if reason or context.object.meshfree.profile is not None:
+            return reason
+        return f'"{context.object.name}" has no profile. Select two points and press Profile first'
+
+    def plan(self, context, obj):
+        name, table, suffix = obj.name, obj.meshfree.profile.as_string(), Path(self.filepath).suffix.lower()
+        if suffix not in (".csv", ".svg"):
+            raise PointCloudError(f'A profile is written as .csv or .svg, not as "{suffix}". Give such an ending.')
+        text = profile_picture(table, context.scene.unit_settings) if suffix == ".svg" else table
+
+        def write(path, progress):
+            write_text(path, text)
+            return f"{name}: profile written to {path.name}"
 
         return write
 
@@ -233,4 +265,5 @@ TOOLS = (
     Registration(MESHFREE_OT_export_operator),
     Registration(MESHFREE_OT_export_eigenvalues),
     Registration(MESHFREE_OT_export_measures),
+    Registration(MESHFREE_OT_export_profile, panel=Row("Points and Groups", 2, 4, "Export Profile...")),
 )

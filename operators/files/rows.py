@@ -4,18 +4,25 @@ import csv
 import json
 
 from ...core.files import replacing
-from ..objects.parts import PartRow
 
 TABLES = (".csv", ".json")
 
 
-def write_rows(path, rows):
-    """Write measures of parts to a file of a kind in `TABLES`, in world lengths; an older file is kept if it fails."""
-    records = [row.record() for row in rows]
+def write_rows(path, records):
+    """Write records of numbers by name, all of the same names, to a file of a kind in `TABLES`.
+
+    An older file is kept if it fails.
+    """
     with replacing(path) as part, open(part, "w", encoding="utf-8", newline="") as file:
         if path.suffix.lower() == ".json":
             json.dump(records, file, indent=1)
             return
-        table = csv.DictWriter(file, PartRow._fields, lineterminator="\n")
+        table = csv.DictWriter(file, records[0].keys(), lineterminator="\n")
         table.writeheader()
         table.writerows(records)
+
+
+def write_text(path, text):
+    """Write a file of text; an older one is kept if it fails."""
+    with replacing(path) as part:
+        part.write_text(text, encoding="utf-8", newline="\n")

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 
 from ... import core
-from ...core.files import MESHES, READABLE, read_points, replacing, write_mesh
+from ...core.files import MESHES, READABLE, read_points, write_mesh
 from ..objects.attributes import point_count
 from ..objects.groups import assign
 from ..objects.options import laplacian_options
@@ -16,21 +16,14 @@ from ..running.application import build_operator, naming
 from ..tools.align import Align
 from ..tools.along import SignedDistance
 from ..tools.compare import Compare, distances
-from ..tools.measures import MeasureParts
 from ..tools.mesh import MeshSurface
 from ..tools.orient import OrientNormals
-from ..tools.sections import CrossSection
 from ..tools.simulate import Simulate
 from . import objects as files
 from . import opening
 from .arguments import as_place, place
-from .rows import TABLES, write_rows
 from .verbs import LEFT_OUT, Apply
 
-_CURVES = (  # columns of a file of curves, and their form
-    "curve,closed,hole,length,area,x,y,z",
-    ["%d", "%d", "%d", "%.9g", "%.9g", "%.17g", "%.17g", "%.17g"],
-)
 _PLACES = "--at"  # group of the points nearest to given positions
 
 
@@ -144,105 +137,6 @@ class Mesh(Apply):
         ((_, name, opened),) = tool.made
         mesh = bpy.data.objects[name].data
         return {"vertices": len(mesh.vertices), "faces": len(mesh.polygons), "open_edges": opened}
-
-
-class MeasureFile(Apply):
-    """The verb `measure`, whose outputs are tables."""
-
-    outputs = TABLES
-
-    def __init__(self):
-        super().__init__("measure_parts", _MeasureInFile)
-        self.name = "measure"
-
-    def save(self, tool, obj, output):
-        write_rows(output, tool.rows)
-        return []
-
-    def figures(self, tool, result):
-        return {"parts": [row.record() for row in result.rows]}
-
-
-class _MeasureInFile(MeasureParts):
-    """The same tool, which remembers its rows in double precision."""
-
-    rows = ()
-
-    def write(self, context, obj, result):
-        self.rows = result.rows
-        return super().write(context, obj, result)
-
-
-class Section(Apply):
-    """The verb `cross-section`, with a plane in the coordinates of the file, whose outputs hold the curves."""
-
-    left_out = LEFT_OUT | {"plane"}
-    outputs = (".csv", ".blend")
-
-    def __init__(self):
-        super().__init__("cross_section", _SectionInFile)
-
-    def add_options(self, parser):
-        parser.add_argument(
-            "--plane",
-            metavar="X,Y,Z",
-            help="position of the plane in the coordinates of the file, as --plane=X,Y,Z where X is below zero; or the"
-            " name of an object of a .blend file, whose local XY plane cuts. Without it, the middle of the points",
-        )
-        parser.add_argument(
-            "--normal", type=place, metavar="X,Y,Z", help="vector across the plane, if no object gives it; else upwards"
-        )
-        super().add_options(parser)
-
-    def check(self, parser, arguments):
-        if arguments.normal is not None and arguments.plane and as_place(arguments.plane) is None:
-            parser.error("--normal goes with a position, not with an object, whose plane has one")
-
-    def prepare(self, tool, obj, path, arguments):
-        tool.plane = arguments.plane or ""
-        tool.place, tool.normal = as_place(tool.plane), arguments.normal
-
-    def save(self, tool, obj, output):
-        if output.suffix.lower() == ".blend":
-            opening.save_scene(output)
-            return []
-        offset, curves = place_of(obj), tool.found.curves
-        rows = [
-            (number, curve.closed, curve.enclosed_area < 0.0, curve.length, curve.enclosed_area)
-            for number, curve in enumerate(curves, 1)
-        ]
-        columns = [
-            np.column_stack([np.tile(row, (len(curve.points), 1)), curve.points + offset])
-            for row, curve in zip(rows, curves, strict=True)
-        ]
-        with replacing(output) as part:
-            np.savetxt(part, np.concatenate(columns), _CURVES[1], ",", header=_CURVES[0], comments="")
-        return []
-
-    def figures(self, tool, result):
-        found = tool.found
-        return {
-            "curves": len(found.curves),
-            "open_curves": sum(not curve.closed for curve in found.curves),
-            "holes": sum(curve.enclosed_area < 0.0 for curve in found.curves),
-            "length": found.length,
-            "enclosed_area": found.enclosed_area,
-        }
-
-
-class _SectionInFile(CrossSection):
-    """The same tool, with a plane in the coordinates of the file."""
-
-    place = None  # of the plane, (3,), unless it is an object
-    normal = None  # across it, unless it is upwards or that of an object
-
-    def cut(self, context, obj, reading):
-        if self.place is not None:
-            return self.place - place_of(obj), (0.0, 0.0, 1.0) if self.normal is None else self.normal, ""
-        place, normal, guessed = super().cut(context, obj, reading)
-        if self.normal is None:
-            return place, normal, guessed
-        return place, self.normal, f"{obj.name} is cut through its middle: no --plane is given."
 
 
 class WithReference(Apply):

@@ -50,6 +50,10 @@ class Verb:
     def check(self, parser, arguments):
         """Refuse incompatible options, by `parser.error`."""
 
+    def beside(self, output, arguments) -> list:
+        """Return the paths of further files that are written beside an output."""
+        return []
+
     def run(self, path, arguments, output) -> dict:
         """Process one file, write the output unless it is None, and return what to print."""
         raise NotImplementedError

@@ -367,6 +367,7 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
         name="Own Material",
         description="Material of the first slot that the display shows and follows",
     )
+    profile: PointerProperty(type=bpy.types.Text, name="Profile", description="Text with the table of the last profile")
     slopes_of: StringProperty(name="Slopes of", description="What is shown with slopes, and its checksum")
     spacing_of: StringProperty(name="Spacing of", description="Checksum of the points whose spacing was measured")
     colors_behind: BoolProperty(

@@ -198,7 +198,9 @@ class MESHFREE_OT_geodesic_path(SelectionOperator, bpy.types.Operator):
     )
 
     def prepare(self, context, obj):
-        reading, laplacian, ends, path = selected_path(context, obj)
+        ends = selected_ends(obj)
+        reading, laplacian = analyzed(context, obj)
+        path = path_between(laplacian, ends)
         straight = length_text(core.polygon_length(laplacian.points[ends]))
         line = f"{length_text(core.polygon_length(path))} along the surface, {straight} straight"
 
@@ -211,33 +213,24 @@ class MESHFREE_OT_geodesic_path(SelectionOperator, bpy.types.Operator):
         return add
 
 
-def selected_path(context, obj):
-    """Find the shortest path between the two selected points.
-
-    Returns
-    -------
-    Reading
-    LaplaceBeltrami
-    ndarray, (2,) int
-        These points.
-    ndarray, (k, 3)
-        Corners of the path, as points are read.
-    """
+def selected_ends(obj):
+    """Return the two points that are selected, between which a path leads, (2,) int."""
     ends = np.flatnonzero(selected(obj))
     if len(ends) != 2:
         raise PointCloudError(
             f'{len(ends):,} points of "{obj.name}" are selected. Select the two between which the path leads.'
         )
-    reading, laplacian = analyzed(context, obj)
-    path = cache.result(
+    return ends
+
+
+def path_between(laplacian, ends, progress=lambda *_: None):
+    """Return the corners of the shortest path between two points, (k, 3), as points are read."""
+    return cache.result(
         laplacian,
         "path",
         ends,
-        compute=lambda: core.geodesic_path(
-            laplacian, *ends.tolist(), geodesics=cache.geodesics(laplacian, lambda *_: None)
-        ),
+        compute=lambda: core.geodesic_path(laplacian, *ends.tolist(), geodesics=cache.geodesics(laplacian, progress)),
     )
-    return reading, laplacian, ends, path
 
 
 TOOLS = (

@@ -1,5 +1,6 @@
 """Profile: the height or an attribute along the shortest path between two points, as a curve and a table."""
 
+import csv
 import io
 
 import bpy
@@ -13,18 +14,19 @@ from ..objects.curves import plot
 from ..objects.place import place_of
 from ..objects.result import length_text
 from ..registration import Registration, Row
-from .measuring import selected_path
+from ..running.application import Tool, naming, operator_reader
+from ..running.stages import Stages
+from .measuring import path_between, selected_ends
 from .select import SelectionOperator
 
 _AXES = "XYZ"
 
 
-class MESHFREE_OT_profile(SelectionOperator, bpy.types.Operator):
-    """Draw the height or an attribute along the shortest path between the two selected points, with a table"""
+class Profile(Tool):
+    """The settings and the work of `meshfree.profile`."""
 
-    bl_idname = "meshfree.profile"
-    bl_label = "Profile"
     asks = ("source", "axis")
+    table = ""  # what was measured, as text with commas
 
     source: StringProperty(
         name="Attribute", description="Attribute of one number at each point; without one, the height along the axis"
@@ -36,31 +38,82 @@ class MESHFREE_OT_profile(SelectionOperator, bpy.types.Operator):
         default="Z",
     )
 
-    def prepare(self, context, obj):
+    def plan_all(self, context, objects, among=()):
+        """Return name and plan of each object: nothing is written to them."""
+        plans = []
+        for obj in objects:
+            with naming(obj.name):
+                plans.append((obj.name, self.plan(context, obj)))
+        return plans
+
+    def ends(self, obj):
+        """Return the two points between which the path leads, (2,) int."""
+        return selected_ends(obj)
+
+    def origin(self, obj):
+        """Return where points as read begin, from where heights are measured, (3,)."""
+        return np.array(obj.matrix_world.translation)
+
+    def plan(self, context, obj):
+        ends = self.ends(obj)
         given = _values(obj, self.source) if self.source else None
-        _, laplacian, _, path = selected_path(context, obj)
-        height = (path + np.array(obj.matrix_world.translation))[:, _AXES.index(self.axis)]
-        found = core.profile(laplacian, path, np.zeros(len(laplacian.points)) if given is None else given)
-        values = height if given is None else found.values
-        if np.isfinite(values).sum() < 2:
-            raise PointCloudError(f'"{self.source}" has no values along the path. Select other points.')
+        reading, operator = operator_reader(context, obj)
+        across, source = _AXES.index(self.axis), self.source
+        base, place = self.origin(obj)[across], place_of(obj)
+
+        def compute(progress):
+            laplacian = operator(progress)
+            path = path_between(laplacian, ends, progress)
+            heights = reading.points[:, across]
+            columns = [heights] if given is None else [heights, given]
+            found = core.profile(laplacian, path, np.column_stack(columns))
+            values, off = found.values[:, -1], found.uncertainty
+            if given is None:
+                values = base + path[:, across]  # on the surface, as between its points
+            if np.isfinite(values).sum() < 2:
+                raise PointCloudError(f'"{source}" has no values along the path. Select other points.')
+            rows = [found.distance, *(path + place).T, base + path[:, across], off[:, 0]]
+            return found.distance, values, off[:, -1], rows if given is None else [*rows, values, off[:, 1]]
+
+        return compute
+
+    def write(self, context, obj, result):
+        distance, values, off, rows = result
+        self.table = _table(rows, self.source)
+        made = plot(obj, f"{obj.name} Profile", distance, values)
+        text = bpy.data.texts.new(f"{made.name}.csv")
+        text.from_string(self.table)
+        obj.meshfree.profile = text
+        missing = np.count_nonzero(~np.isfinite(values))
+        notices = []
+        if missing:
+            notices.append(f"{obj.name}: {missing:,} of {len(values):,} places of the path have no value.")
         name = self.source or f"height along {self.axis}"
-        places = path + place_of(obj)
+        line = (
+            f"{made.name}: {length_text(distance[-1])} long, {name} from {np.nanmin(values):.4g} to"
+            f" {np.nanmax(values):.4g}, +- {np.sqrt(np.nanmean(off**2)):.2g}. The table is the text {text.name}"
+        )
+        return [*notices, line]
+
+
+class MESHFREE_OT_profile(Profile, SelectionOperator, bpy.types.Operator):
+    """Draw the height or an attribute along the shortest path between the two selected points, with a table"""
+
+    bl_idname = "meshfree.profile"
+    bl_label = "Profile"
+
+    def prepare(self, context, obj):
+        compute = self.plan(context, obj)
+        with Stages(context.window_manager, "Points") as stages:
+            result = compute(stages)
 
         def add():
-            made = plot(obj, f"{obj.name} Profile", found.distance, values)
-            table = bpy.data.texts.new(f"{made.name}.csv")
-            table.from_string(_table(found.distance, places, height, self.source, values))
-            line = (
-                f"{length_text(found.distance[-1])} long, {name} from {np.nanmin(values):.4g} to"
-                f" {np.nanmax(values):.4g}. The table is the text {table.name}"
-            )
+            *notices, line = self.write(context, obj, result)
             self.begin_notices([obj])
-            self.note(f"{obj.name}: {line}", obj)
-            missing = np.count_nonzero(~np.isfinite(values))
-            if missing:
-                self.warn(f"{obj.name}: {missing:,} of {len(values):,} places of the path have no value.", obj)
-            return f"{made.name} is {line}"
+            self.note(line, obj)
+            for notice in notices:
+                self.warn(notice, obj)
+            return line
 
         return add
 
@@ -78,15 +131,17 @@ def _values(obj, name):
     return read_attribute(obj.data, name)
 
 
-def _table(distance, places, height, source, values):
+def _table(columns, source):
     """Return a table as text with commas: of heights alone, or with an attribute."""
-    columns, names = [distance, *places.T, height], ["distance", "x", "y", "z", "height"]
+    names = ["distance", "x", "y", "z", "height", "height_uncertainty"]
     if source:
-        columns, names = [*columns, values], [*names, source]
+        names += [source, f"{source}_uncertainty"]
     text = io.StringIO()
-    header = ",".join(f'"{name}"' if set(name) & set(',"') else name for name in names)
-    np.savetxt(text, np.column_stack(columns), "%.12g", ",", header=header, comments="")
+    csv.writer(text, lineterminator="\n").writerow(names)
+    np.savetxt(text, np.column_stack(columns), "%.12g", ",")
     return text.getvalue()
 
 
-TOOLS = (Registration(MESHFREE_OT_profile, panel=Row("Points and Groups", 2, 3), menu=Row("Points", 2, 3)),)
+TOOLS = (
+    Registration(MESHFREE_OT_profile, panel=Row("Points and Groups", 2, 3), menu=Row("Points", 2, 3), verb=Profile),
+)

@@ -531,7 +531,17 @@ class TestMenus:
     def test_entries(self, extension):
         for name, idnames in (
             ("import", ["import_points"]),
-            ("export", ["export_points", "export_splats", "export_operator", "export_eigenvalues", "export_measures"]),
+            (
+                "export",
+                [
+                    "export_points",
+                    "export_splats",
+                    "export_operator",
+                    "export_eigenvalues",
+                    "export_measures",
+                    "export_profile",
+                ],
+            ),
         ):
             drawn = getattr(bpy.types, f"TOPBAR_MT_file_{name}")._dyn_ui_initialize()
             (draw,) = [function for function in drawn if function.__module__.startswith(extension.__name__)]

@@ -22,6 +22,7 @@ KEPT = {
     "motion_file",
     "motion_first",
     "motion_step",
+    "profile",
     "spacing",
     "spacing_of",
     "slopes_of",

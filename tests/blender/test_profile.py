@@ -1,5 +1,7 @@
 """Profile: the height or an attribute along the path between two selected points, as a curve and a table."""
 
+from xml.etree import ElementTree
+
 import bpy
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ from numpy.testing import assert_allclose
 
 from tests.blender.clouds import add_object, local_points, sphere_points
 from tests.blender.operators import refused
+from tests.blender.test_command import run  # noqa: F401
 from tests.blender.test_smooth_colors import add_values
 
 
@@ -43,7 +46,7 @@ def table(obj):
 def test_height_by_distance(obj):
     assert bpy.ops.meshfree.profile() == {"FINISHED"}
     places, (header, rows) = drawn(obj), table(obj)
-    assert header == "distance,x,y,z,height"
+    assert header == "distance,x,y,z,height,height_uncertainty"
     assert_allclose(rows[-1, 0], 0.5 * np.pi, atol=0.03)
     assert_allclose(np.linalg.norm(rows[:, 1:4] - [1.0, 2.0, 3.0], axis=1), 1.0, atol=5e-3)
     assert_allclose(rows[:, 4], rows[:, 3], atol=1e-9)
@@ -62,10 +65,12 @@ def test_an_attribute_in_edit_mode_along_another_axis(obj):
     assert obj.mode == "EDIT"
     bpy.ops.object.mode_set(mode="OBJECT")
     header, rows = table(obj)
-    assert header == "distance,x,y,z,height,wide"
+    assert header == "distance,x,y,z,height,height_uncertainty,wide,wide_uncertainty"
     assert_allclose(rows[:, 4], rows[:, 2], atol=1e-9)
-    assert_allclose(rows[:, 5], 10.0 * (rows[:, 2] - 2.0), atol=0.2)
-    assert_allclose(drawn(obj)[:, 2], rows[:, 5], atol=1e-5)
+    assert_allclose(rows[:, 6], 10.0 * (rows[:, 2] - 2.0), atol=0.2)
+    assert_allclose(rows[:, 7], 10.0 * rows[:, 5], rtol=1e-3)
+    assert np.mean(np.abs(rows[:, 6] - 10.0 * (rows[:, 2] - 2.0)) <= rows[:, 7]) > 0.7
+    assert_allclose(drawn(obj)[:, 2], rows[:, 6], atol=1e-5)
 
 
 def test_gaps_are_told(obj):
@@ -75,7 +80,7 @@ def test_gaps_are_told(obj):
     add_values(obj, "some", np.where(points @ middle > 0.95, np.nan, 1.0))
     assert bpy.ops.meshfree.profile(source="some") == {"FINISHED"}
     assert len(bpy.data.objects[f"{obj.name} Profile"].data.splines) == 2
-    missing = np.count_nonzero(np.isnan(table(obj)[1][:, 5]))
+    missing = np.count_nonzero(np.isnan(table(obj)[1][:, 6]))
     assert f"{missing} of " in told(obj)
 
 
@@ -96,3 +101,99 @@ def test_an_attribute_without_values_leaves_nothing(obj):
         bpy.ops.meshfree.profile(source="none")
     assert len(bpy.data.objects) == 1
     assert not bpy.data.texts
+
+
+def drawing(text):
+    """Return texts and lines, (k, 2) each, of an SVG picture."""
+    root = ElementTree.fromstring(text)
+    space = "{http://www.w3.org/2000/svg}"
+    lines = [
+        np.array([pair.split(",") for pair in line.get("points").split()], float)
+        for line in root.iter(f"{space}polyline")
+    ]
+    return [one.text for one in root.iter(f"{space}text")], lines
+
+
+def test_the_last_one_is_exported_as_a_table_and_as_a_picture(obj, tmp_path):
+    with refused(obj, "has no profile"):
+        bpy.ops.meshfree.export_profile(filepath=str(tmp_path / "a.csv"))
+    bpy.ops.meshfree.profile()
+    assert bpy.ops.meshfree.export_profile(filepath=str(tmp_path / "a.csv")) == {"FINISHED"}
+    assert (tmp_path / "a.csv").read_text() == bpy.data.texts[f"{obj.name} Profile.csv"].as_string()
+    bpy.ops.meshfree.export_profile(filepath=str(tmp_path / "a.svg"))
+    texts, (line,) = drawing((tmp_path / "a.svg").read_text())
+    assert {"Distance (m)", "Height (m)"} <= set(texts)
+    rows = table(obj)[1]
+    assert_allclose((line[:, 0] - line[0, 0]) / np.ptp(line[:, 0]), rows[:, 0] / rows[-1, 0], atol=1e-3)
+    heights = (rows[:, 4] - rows[:, 4].min()) / np.ptp(rows[:, 4])
+    assert_allclose((line[:, 1].max() - line[:, 1]) / np.ptp(line[:, 1]), heights, atol=2e-3)
+    with refused(obj, "is written as .csv or .svg"):
+        bpy.ops.meshfree.export_profile(filepath=str(tmp_path / "a.png"))
+
+
+def test_a_picture_has_gaps_units_and_any_name(obj, tmp_path):
+    add_values(obj, "a<b & c", np.where(local_points(obj)[:, 0] > 0.1, np.nan, 1.0))
+    bpy.context.scene.unit_settings.length_unit = "MILLIMETERS"
+    points = local_points(obj)
+    ends = [int(points[:, 0].argmin()), int(points[:, 0].argmax())]
+    obj.data.vertices.foreach_set("select", np.isin(np.arange(1000), ends))
+    bpy.ops.meshfree.profile(source="a<b & c")
+    bpy.ops.meshfree.export_profile(filepath=str(tmp_path / "a.svg"))
+    texts, lines = drawing((tmp_path / "a.svg").read_text())
+    assert {"Distance (mm)", "a<b & c"} <= set(texts)
+    assert "3,000" in texts
+    assert len(lines) == 1
+
+
+def test_a_changed_table_is_told(obj, tmp_path):
+    bpy.ops.meshfree.profile()
+    obj.meshfree.profile.from_string("no,table\nat,all")
+    with refused(obj, "not as it was written"):
+        bpy.ops.meshfree.export_profile(filepath=str(tmp_path / "a.svg"))
+    bpy.data.texts.remove(obj.meshfree.profile)
+    with refused(obj, "has no profile"):
+        bpy.ops.meshfree.export_profile(filepath=str(tmp_path / "a.svg"))
+
+
+class TestVerb:
+    FAR = np.array([400_000.0, 5_000_000.0, 100.0])
+
+    @pytest.fixture
+    def path(self, tmp_path):
+        points = sphere_points(1000)
+        rows = np.column_stack([points + self.FAR, points[:, 0]])
+        np.savetxt(tmp_path / "a.csv", rows, "%.15g", ",", header="x,y,z,wide", comments="")
+        return tmp_path / "a.csv"
+
+    def ends(self):
+        return [
+            f"--{name}={','.join(map(str, self.FAR + end))}" for name, end in (("from", [0, 0, 1]), ("to", [1, 0, 0]))
+        ]
+
+    def test_table_and_picture_in_the_coordinates_of_the_file(self, run, path, tmp_path):  # noqa: F811
+        code, [line] = run("profile", path, *self.ends(), "--out", tmp_path / "out.csv", "--svg")
+        assert code == 0, line
+        assert line["length"] == pytest.approx(0.5 * np.pi, abs=0.1)
+        assert max(line["distances_of_ends"]) < 0.2
+        rows = np.loadtxt(tmp_path / "out.csv", delimiter=",", skiprows=1)
+        assert_allclose(np.linalg.norm(rows[:, 1:4] - self.FAR, axis=1), 1.0, atol=5e-3)
+        assert_allclose(rows[[0, -1], 1:4], line["ends"], rtol=0.0, atol=1e-4)
+        assert_allclose(rows[:, 4], rows[:, 3], rtol=0.0, atol=1e-6)
+        assert_allclose([line["lowest"], line["highest"]], [rows[:, 4].min(), rows[:, 4].max()], rtol=1e-9)
+        texts, (drawn_line,) = drawing((tmp_path / "out.svg").read_text())
+        assert "Height (m)" in texts
+        assert len(drawn_line) == len(rows)
+
+    def test_an_attribute_of_the_file(self, run, path, tmp_path):  # noqa: F811
+        code, [line] = run("profile", path, *self.ends(), "--source", "wide", "--out", tmp_path / "out.csv")
+        assert code == 0, line
+        rows = np.loadtxt(tmp_path / "out.csv", delimiter=",", skiprows=1)
+        assert_allclose(rows[:, 6], rows[:, 1] - self.FAR[0], atol=0.03)
+        assert not (tmp_path / "out.svg").exists()
+
+    def test_what_is_missing_or_wrong(self, run, path):  # noqa: F811
+        assert run("profile", path, self.ends()[0])[0] == 2
+        assert run("profile", path, *self.ends(), "--svg")[0] == 2
+        code, [line] = run("profile", path, self.ends()[0], self.ends()[0].replace("from", "to"))
+        assert code == 1
+        assert "same point" in line["error"]

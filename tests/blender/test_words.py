@@ -17,6 +17,7 @@ NO_UNDO = {
     "export_measures",
     "export_operator",
     "export_points",
+    "export_profile",
     "export_splats",
     "measure_live",
     "stop",

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import core
-from benchmarks.samplings import fibonacci_sphere, square_random
+from benchmarks.samplings import fibonacci_sphere, random_sphere, square_random
 
 
 def test_on_a_plane_linear_functions_stay_linear():
@@ -59,6 +59,29 @@ def test_unknown_values_are_gaps_and_no_others():
     found = core.profile(core.build_laplacian(points), path, np.where(points[:, 2] > 0.3, np.nan, 1.0))
     assert np.isnan(found.values[path[:, 2] > 0.35]).all()
     np.testing.assert_allclose(found.values[path[:, 2] < 0.1], 1.0, rtol=0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02, 0.2])
+def test_the_uncertainty_holds_nearly_all_errors_and_not_much_more(noise):
+    points = random_sphere(2000)
+    laplacian = core.build_laplacian(points)
+    angle = np.linspace(0.2, 2.9, 300)
+    path = np.column_stack([np.sin(angle), 0.0 * angle, np.cos(angle)])
+    values = points[:, 0] ** 2 + noise * np.random.default_rng(2).standard_normal(2000)
+    found = core.profile(laplacian, path, np.column_stack([values, np.full(2000, 3.0)]))
+    error = np.abs(found.values[:, 0] - np.sin(angle) ** 2)
+    assert np.mean(error <= found.uncertainty[:, 0]) > 0.85
+    assert np.sqrt(np.mean(found.uncertainty[:, 0] ** 2)) < 4.0 * np.sqrt(np.mean(error**2))
+    np.testing.assert_allclose(found.uncertainty[:, 1], 0.0, atol=1e-5)
+
+
+def test_the_uncertainty_is_unknown_where_values_are():
+    points = fibonacci_sphere(1500)
+    angle = np.linspace(0.2, 2.9, 200)
+    path = np.column_stack([np.sin(angle), 0.0 * angle, np.cos(angle)])
+    found = core.profile(core.build_laplacian(points), path, np.where(points[:, 2] > 0.3, np.nan, points[:, 0]))
+    np.testing.assert_array_equal(np.isnan(found.uncertainty), np.isnan(found.values))
+    assert 0.0 < np.nanmax(found.uncertainty) < 0.05
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,6 @@
 """In which unit the numbers of an attribute are written."""
 
-from ..operators.objects.quantities import quantity
+from .quantities import quantity
 
 EIGENVALUE_POWER = -2
 _METERS = {
