@@ -20,7 +20,7 @@ def draw_setting(layout, settings, name: str, obj):
     """Draw a setting; that of a group or an attribute with a list of those of an object."""
     if name.endswith("group"):
         search_group(layout, settings, name, obj)
-    elif name in {"viewpoint", "curve", "plane"}:
+    elif name in {"viewpoint", "curve", "plane", "toucher"}:
         layout.prop_search(settings, name, bpy.data, "objects")
     elif name == "source":
         layout.prop_search(settings, name, obj.data, "attributes")
