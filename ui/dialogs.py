@@ -79,7 +79,7 @@ def _draw(operator, context, names):
 
 
 # At import: Blender checks at registration whether a class has a layout of its own.
-ApplicationOperator.draw = _draw_tool
+ApplicationOperator.draw = MESHFREE_OT_profile.draw = _draw_tool
 _ASKING = (
     MESHFREE_OT_export_points,
     MESHFREE_OT_export_splats,
@@ -87,7 +87,6 @@ _ASKING = (
     MESHFREE_OT_deform_bake,
     MESHFREE_OT_analyze_sequence,
     MESHFREE_OT_select_grow,
-    MESHFREE_OT_profile,
 )
 for kind in _ASKING:
     kind.draw = _draw_asked

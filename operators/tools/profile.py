@@ -25,7 +25,7 @@ _AXES = "XYZ"
 class Profile(Tool):
     """The settings and the work of `meshfree.profile`."""
 
-    asks = adjustable = ("source", "axis")
+    asks = ("source", "axis")
     table = ""  # what was measured, as text with commas
 
     source: StringProperty(
