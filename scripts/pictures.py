@@ -5,6 +5,7 @@ of them, named by the environment variable MESHFREE_SCANS.
 """
 
 import argparse
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
@@ -26,6 +27,7 @@ CUT = 0.45  # height at which the shape is cut open for the picture of a boundar
 SPACING = 0.038  # of the points of the demonstration's shape
 LINES = 15
 FRAMES = 100  # of motions
+LOOP, FADE = 16, 3  # pictures in a loop, and how many of them lead back to the first
 
 
 def coral(noise=0.0):
@@ -376,24 +378,19 @@ def minimal(path):
     studio.take(path, legend=objects[0])
 
 
-def motion(kind, shown, **settings):
-    """Return a function that renders a motion from the tip of an arm, at some of its frames."""
+def motion(kind, last, **settings):
+    """Return a function that renders a motion from the tip of an arm as a loop: to a frame, and back to the first."""
 
     def take(path):
-        scene, first = bpy.context.scene, coral()
+        scene, obj, frames = bpy.context.scene, coral(), part("operators.objects.motion")
         scene.frame_start, scene.frame_end = 1, FRAMES
-        studio.group(first, studio.tip(first, (1.0, -1.0, 0.0)), "SOURCE")
+        studio.group(obj, studio.tip(obj, (1.0, -1.0, 0.0)), "SOURCE")
         bpy.ops.meshfree.simulate(kind=kind, **settings)
-        objects = [first]
-        for frame in shown:
-            obj = first if frame == shown[0] else first.copy()
-            if obj != first:
-                obj.data = first.data.copy()
-                scene.collection.objects.link(obj)
-                objects.append(obj)
-            part("operators.objects.motion").show_frame(obj, frame)
-            obj.meshfree.motion_file = "" if obj != first else obj.meshfree.motion_file
-        row(objects, path, legend=first)
+        shown = [frames.frame_of(obj, frame) for frame in np.linspace(1, last, LOOP - FADE)]
+        shares = np.arange(1, FADE + 1) / (FADE + 1)
+        shown += [(1.0 - share) * shown[-1] + share * shown[0] for share in shares]
+        obj.meshfree.motion_file = ""  # which Blender would play as it renders
+        studio.loop(obj, (partial(frames.show_values, obj, values) for values in shown), path)
 
     return take
 
@@ -432,10 +429,10 @@ PICTURES = {
     "field": field,
     "deform": deform,
     "minimal": minimal,
-    "motion_heat": motion("HEAT", (1, 15, 40, 100), width=1.0, distance=2.5),
-    "motion_wave": motion("WAVE", (1, 25, 50, 80), width=0.5, distance=6.0),
-    "motion_reaction": motion("REACTION", (1, 25, 50, 100), distance=0.55),
-    "motion_front": motion("FRONT", (10, 25, 40, 60), width=0.4),
+    "motion_heat": motion("HEAT", 70, width=1.0, distance=2.5),
+    "motion_wave": motion("WAVE", 75, width=0.5, distance=6.0, height=0.25),
+    "motion_reaction": motion("REACTION", 100, distance=0.55),
+    "motion_front": motion("FRONT", 70, width=0.4),
     **paper_pictures.PICTURES,
     **scan_pictures.PICTURES,
 }

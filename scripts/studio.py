@@ -5,11 +5,14 @@ import importlib
 import math
 import os
 import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import bpy
 import numpy as np
 from mathutils import Euler, Matrix, Vector
 
+import animation
 import package
 
 MODULE = "bl_ext.user_default.meshfree_laplacian"
@@ -18,7 +21,9 @@ VIEW = (0.45, -1.0, 0.35)  # direction towards the camera
 LENS, FAR_LENS = 50.0, 250.0  # focal length, mm; objects in a row are seen from the same side by the latter
 TOUCHING = 1.6  # radius of dots that make a closed surface, in units of their spacing
 CLOSED = 2.0  # without any gap, which would show as dark holes in clay
-SIZE, WIDE = (640, 400), (800, 360)  # of pictures of the manual, in pixels
+SIZE, WIDE, SMALL = (640, 400), (800, 360), (320, 240)  # of pictures of the manual, in pixels
+LOOP_SAMPLES = 6  # rays per pixel of the pictures of a loop, whose colors are few
+DELAY = 120  # milliseconds from one picture of a loop to the next
 SAMPLES = 64  # rays per pixel of these
 LEVELS = 52  # of each color in pictures of many objects: the background stays gray
 CLAY = (0.62, 0.58, 0.52, 1.0)
@@ -314,6 +319,39 @@ def take(path, legend, view=VIEW, size=WIDE):
     if legend is not None:
         part("ui.legend").make_legend(scene, legend, scene.camera)
     render(scene, path)
+
+
+def loop(obj, changes, path, view=VIEW):
+    """Render an object after each of some changes into an animated picture of the manual.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    changes : iterable of callable
+        Functions without arguments.
+    path : pathlib.Path
+    view : sequence of 3 floats
+        Direction from the object towards the camera.
+    """
+    scene, stills = bpy.context.scene, []
+    set_up(scene, obj, SMALL, LOOP_SAMPLES, view, legend=False)
+    with TemporaryDirectory() as folder:
+        still = Path(folder) / "still.png"
+        for change in changes:
+            change()
+            render(scene, still)
+            stills.append(_pixels(still))
+    animation.write_loop(path, np.array(stills), DELAY)
+
+
+def _pixels(path):
+    """Return the pixels of a picture from its top left on, (height, width, 3) uint8."""
+    image = bpy.data.images.load(str(path))
+    values = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(values)
+    width, height = image.size
+    bpy.data.images.remove(image)
+    return np.rint(255.0 * values.reshape(height, width, -1)[::-1, :, :3]).astype(np.uint8)
 
 
 def set_range(obj, low, high):
