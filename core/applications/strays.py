@@ -34,8 +34,9 @@ class Strays:
     Attributes
     ----------
     scores : ndarray, (n,)
-        Height of each point over the surface that its neighbors describe, over what counts as on the surface there:
-        above 1 for a stray point. It does not change with the scale.
+        Above 1 for a stray point: the height over the surface that its neighbors describe, over what counts as on the
+        surface there and 4 at most, or its cube where above 1, times the fourth power of the distance of the third
+        neighbor over two spacings. It does not change with the scale.
     part_counts : ndarray, (n,) int
         Number of points of the part that holds the point; gaps separate parts. 0 for a point off the surface, which
         no part holds.
@@ -165,8 +166,10 @@ def stray_points(
     Notes
     -----
     Twelve neighbors of a point are its witnesses. Each describes the surface by a quadric through its own neighbors,
-    fitted robustly, without points that are sparse against their surroundings. A point is stray unless three witnesses
-    pass nearer than 0.4 of its spacing and three standard deviations of the scatter around the witness.
+    fitted robustly, without points that are sparse against their surroundings. The height of a point is the third
+    least over these, in units of 0.4 of its spacing and three standard deviations of the scatter around the witness. A
+    point is stray by its height and by its distance from the points on the surface, see `Strays.scores`: points that
+    scatter about a rough surface as densely as those around are kept.
 
     References
     ----------

@@ -4,7 +4,7 @@ import numpy as np
 
 from ..types import Bools, Floats, Ints, Report
 from .components import even_reach, label_connected
-from .nearest import GAP, ON, Nearest
+from .nearest import AGREEING, FEW, GAP, ON, Nearest
 from .noise import FILLING
 from .outliers import SCATTERS, Alone, heights_over_witnesses, third_least, witnesses_of
 from .quadrics import fit_quadrics
@@ -14,6 +14,9 @@ PARTS = 30  # points of a part that others are joined to, and that is no clump o
 _ON = 0.4  # spacings from the surface within which a point lies on it
 _AROUND = slice(1, 25)  # neighbours whose spacing a point's own is compared with, by their lower quartile
 _LONELY = 1.7  # times that a point's third neighbour is away: no witness until it is known to be on the surface
+_ALONE = 2.0  # times the spacing around that a point's third neighbour is away: off the surface by one, it is stray
+_POWER = 4.0  # of that distance: a little farther away tells more than a little higher
+_HIGHEST = 4.0  # height that counts: where points scatter more, as in trees, it tells no more
 _SPARSE = 1.3  # times its spacing: witnesses must show a surface
 _FILLING = 0.6  # scatter around a witness, in spacings, that no surface has
 _ROUGHER = 2.0  # nor has it so much more than the upper quartile of the cloud
@@ -27,7 +30,8 @@ def stray_scores(nearest: Nearest, report: Report = lambda: None) -> Floats:
 
     As in `find_outliers` twelve neighbours are the witnesses of a point, and three must agree. Here points far from
     their neighbours, by the spacing of these, take part in no witness' quadric until they are known to be on the
-    surface, so that many stray points do not vouch for each other.
+    surface, so that many stray points do not vouch for each other. What scatters about the surface as densely as the
+    points around is no stray, and what lies alone needs less height to be one.
 
     Parameters
     ----------
@@ -39,32 +43,64 @@ def stray_scores(nearest: Nearest, report: Report = lambda: None) -> Floats:
     Returns
     -------
     ndarray, (m,)
-        The third least height over the quadrics of the witnesses, over what counts as on the surface: above 1 off it,
-        infinite where no three witnesses show a surface.
+        Above 1 for stray points: the height, that is the third least over the quadrics of the witnesses, over what
+        counts as on the surface, 4 at most, or its cube where above 1, times the fourth power of the distance of the
+        third neighbour on the surface, over two spacings of the points there. Infinite where no three witnesses show a
+        surface.
     """
     spacing, surface = nearest.spacing, nearest.quadrics
     around = np.quantile(spacing[nearest.index[:, _AROUND]], 0.25, axis=1)
     third = nearest.distance[:, min(_NEAR, nearest.distance.shape[1] - 1)]
     sparse, sparsest = spacing > _SPARSE * around, spacing > GAP * np.median(spacing)
     off, before = third > _LONELY * around, np.zeros(len(spacing), dtype=bool)
+    lonely = off
     for _ in range(_ROUNDS):
         report()
         clean, rows = nearest.keep(~off[nearest.index]), np.flatnonzero((off != before)[nearest.index].any(axis=1))
         surface = surface.put(rows, fit_quadrics(clean.points, clean.index[rows], clean.weight[rows], rows))
         clean = clean.with_quadrics(surface)
-        scores = _scores(clean, sparse, sparsest, off)
+        height = _heights(clean, sparse, sparsest, off, lonely)
+        before, off = off, height > 1.0
+        if (off == before).all():
+            break
+    # Off the surface the height decides, up to where points scatter; on it, the distance from others.
+    share = np.minimum(height, _HIGHEST)
+    share = np.where(np.isinf(height), np.inf, np.maximum(share, share**3))
+    for _ in range(_ROUNDS):
+        report()
+        scores: Floats = share * (_loneliness(nearest, off) / _ALONE) ** _POWER
         before, off = off, scores > 1.0
         if (off == before).all():
             break
     return scores
 
 
-def _scores(clean: Nearest, sparse: Bools, sparsest: Bools, off: Bools) -> Floats:
-    """Return the scores, (m,), by quadrics without the points that are off the surface so far."""
+def _loneliness(nearest: Nearest, off: Bools) -> Floats:
+    """Return how far the third neighbour is, over the spacing there, (m,), as if points off the surface were not there.
+
+    The spacing is the median of those of the three neighbours. The last of the forty stands for those beyond.
+    """
+    known = np.cumsum(~off[nearest.index[:, 1:]], axis=1, dtype=np.int8)
+    rows, last = np.arange(len(off)), known.shape[1]
+
+    def place(count: int) -> Ints:
+        """Return where the neighbour of that number stands, or the last one."""
+        found: Ints = np.minimum(1 + np.count_nonzero(known < count, axis=1), last)
+        return found
+
+    few = min(FEW, last)
+    spacing = nearest.distance[rows, place(few)] * np.sqrt(np.pi / few)
+    around = np.median([spacing[nearest.index[rows, place(1 + count)]] for count in range(AGREEING)], axis=0)
+    result: Floats = nearest.distance[rows, place(AGREEING)] / around
+    return result
+
+
+def _heights(clean: Nearest, sparse: Bools, sparsest: Bools, off: Bools, lonely: Bools) -> Floats:
+    """Return the heights, (m,), over what counts as on the surface, by quadrics without the points off it so far."""
     spacing, surface, result = clean.spacing, clean.quadrics, np.zeros(len(off))
     roughness = np.quantile((surface.misfit / spacing)[~off], 0.75) if not off.all() else 0.0
     rough = third_least(heights_over_witnesses(clean, surface, np.arange(len(off)))) > _ON * spacing
-    suspects = np.flatnonzero(off | rough | (sparsest & (surface.misfit > ON * spacing)))
+    suspects = np.flatnonzero(off | lonely | rough | (sparsest & (surface.misfit > ON * spacing)))
     witnesses, alone = witnesses_of(clean, suspects), Alone(clean, surface)
     alone.fit(clean, surface, np.unique(witnesses))
     scatter = alone.scatter[witnesses]

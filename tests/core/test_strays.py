@@ -89,15 +89,17 @@ def test_a_stricter_choice_holds_the_milder_one():
         assert np.count_nonzero(milder) < np.count_nonzero(stricter)
 
 
-def test_scores_tell_the_height():
-    """Over an even plane a score is the height over 0.4 of the spacing, that of the point above it, pi (r^2 + h^2)."""
+def test_scores_tell_the_height_and_the_distance():
+    """Over an even plane: height over 0.4 of the spacing of the point, cubed; distance over two of the plane."""
     x, y = np.meshgrid(np.arange(40.0), np.arange(40.0))
     plane = np.column_stack([x.ravel(), y.ravel(), np.zeros(1600)])
     heights = np.array([1.0, 2.0, 4.0])
     above = np.column_stack([[10.5, 19.5, 29.5], [10.5, 19.5, 29.5], heights])
     scores = core.Strays(np.concatenate([plane, above])).scores
-    near12 = np.sort(np.linalg.norm(plane[None] - above[:, None], axis=2), axis=1)[:, 11]
-    np.testing.assert_allclose(scores[1600:], heights / (0.4 * near12 * np.sqrt(np.pi / 12.0)), rtol=1e-6)
+    near = np.sort(np.linalg.norm(plane[None] - above[:, None], axis=2), axis=1)
+    heights = np.minimum(heights / (0.4 * near[:, 11] * np.sqrt(np.pi / 12.0)), 4.0)
+    around = np.sort(np.linalg.norm(plane - [10.0, 10.0, 0.0], axis=1))[12] * np.sqrt(np.pi / 12.0)
+    np.testing.assert_allclose(scores[1600:], heights**3 * (near[:, 2] / (2.0 * around)) ** 4, rtol=1e-6)
     np.testing.assert_allclose(scores[:1600], 0.0, atol=1e-9)
 
 
