@@ -3,6 +3,7 @@
 from .applications.alignment import Alignment as Alignment
 from .applications.alignment import align as align
 from .applications.alignment import match_places as match_places
+from .applications.bone_weights import bone_weights as bone_weights
 from .applications.cleaning import clean_points as clean_points
 from .applications.coarse_deformation import CoarseDeformer as CoarseDeformer
 from .applications.coarse_deformation import coarse_deformer as coarse_deformer
@@ -27,6 +28,8 @@ from .applications.geodesics import geodesic_distance as geodesic_distance
 from .applications.geodesics import nearest_source as nearest_source
 from .applications.geodesics import signed_distance as signed_distance
 from .applications.gradients import deformation_gradients as deformation_gradients
+from .applications.inpainting import inpaint as inpaint
+from .applications.inpainting import smooth_weights as smooth_weights
 from .applications.iso_lines import IsoLine as IsoLine
 from .applications.iso_lines import iso_lines as iso_lines
 from .applications.matching import MatchedModes as MatchedModes
@@ -62,6 +65,7 @@ from .applications.segmentation import segment as segment
 from .applications.selection import front_point as front_point
 from .applications.selection import grow as grow
 from .applications.selection import opposite_ends as opposite_ends
+from .applications.skinning import skin as skin
 from .applications.slopes import Slopes as Slopes
 from .applications.smoothing import PointBlend as PointBlend
 from .applications.smoothing import displace_by_mode as displace_by_mode

@@ -120,11 +120,15 @@ BELOW = {  # what each wing of core may use
     "splats": GROUND | {"algebra", "files"},
 }
 SIDEWAYS = {  # applications that build on others
+    ("bone_weights", "inside"),
+    ("bone_weights", "reduced"),
     ("coarse_deformation", "deformation"),
     ("deformation", "gradients"),
     ("deformation", "graph"),
     ("fields", "graph"),
     ("geodesics", "graph"),
+    ("inpainting", "motion"),
+    ("inpainting", "reduced"),
     ("meshing", "sides"),
     ("motion", "propagation"),
     ("reaction", "propagation"),

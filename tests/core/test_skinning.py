@@ -1,0 +1,103 @@
+"""Points that follow bones."""
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+import core
+
+GIVEN = np.random.default_rng(4)
+
+
+def turned(axis, angle, shift=(0.0, 0.0, 0.0), about=(0.0, 0.0, 0.0)):
+    """Matrix of a rotation by an angle around an axis through a place, and a shift, (3, 4)."""
+    axis = np.asarray(axis, float) / np.linalg.norm(axis)
+    cross = np.cross(np.eye(3), axis)
+    rotation = np.eye(3) + np.sin(angle) * cross.T @ np.eye(3) * -1.0 + (1 - np.cos(angle)) * cross @ cross
+    return np.column_stack([rotation, np.asarray(shift) + about - rotation @ about])
+
+
+class TestSkin:
+    points = GIVEN.standard_normal((200, 3))
+    weights = GIVEN.dirichlet([0.4, 0.4, 0.4], 200)
+
+    @pytest.mark.parametrize("dual", [False, True])
+    def test_a_pose_that_is_rigid_as_a_whole_is_that_of_all_points(self, dual):
+        matrix = turned((1, 2, -1), 2.6, (4, 5, 6))
+        moved, gradients = core.skin(self.points, self.weights, [matrix] * 3, dual_quaternions=dual, gradients=True)
+        assert moved == pytest.approx(self.points @ matrix[:, :3].T + matrix[:, 3], abs=1e-12)
+        assert gradients == pytest.approx(np.broadcast_to(matrix[:, :3], (200, 3, 3)), abs=1e-12)
+
+    @pytest.mark.parametrize("dual", [False, True])
+    def test_a_point_of_one_bone_follows_it_stretch_and_all(self, dual):
+        matrices = GIVEN.standard_normal((3, 3, 4))
+        matrices[:, :, :3] = [turned(GIVEN.standard_normal(3), 3.0)[:, :3] @ np.diag([1.0, 2.0, 0.5]) for _ in range(3)]
+        bone = GIVEN.integers(0, 3, 200)
+        moved = core.skin(self.points, np.eye(3)[bone], matrices, dual_quaternions=dual)
+        assert moved == pytest.approx(
+            np.einsum("nij,nj->ni", matrices[bone, :, :3], self.points) + matrices[bone, :, 3], abs=1e-10
+        )
+
+    def test_half_of_a_screw_turns_by_half(self):
+        whole = turned((0, 0, 1), 1.2, (0, 0, 0.6))
+        still = turned((0, 0, 1), 0.0)
+        half = turned((0, 0, 1), 0.6, (0, 0, 0.3))
+        moved = core.skin(self.points, np.full((200, 2), 0.5), [whole, still], dual_quaternions=True)
+        assert moved == pytest.approx(self.points @ half[:, :3].T + half[:, 3], abs=1e-12)
+        assert core.skin(self.points, np.full((200, 1), 0.5), [whole], dual_quaternions=True) == pytest.approx(moved)
+
+    @pytest.mark.parametrize("dual", [False, True])
+    def test_gradients_are_slopes_of_the_motion(self, dual):
+        matrices = [turned((1, 0, 1), 0.8, (1, 0, 0)), turned((0, 1, 0), -0.9), turned((1, 1, 1), 2.0, (0, 0, 3))]
+        _, gradients = core.skin(self.points, self.weights, matrices, dual_quaternions=dual, gradients=True)
+        for axis in np.eye(3):
+            ahead, behind = (
+                core.skin(self.points + step * axis, self.weights, matrices, dual_quaternions=dual)
+                for step in (1e-4, -1e-4)
+            )
+            assert (ahead - behind) / 2e-4 == pytest.approx(gradients @ axis, abs=1e-8)
+
+    def test_a_bent_bar_keeps_its_volume_by_screws(self):
+        """A quarter of a turn about y: linear blending halves the cross section in the bend, screws do not."""
+        angle = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+        x = np.linspace(-2, 2, 81)
+        points = np.array([[t, 0.3 * np.cos(a), 0.3 * np.sin(a)] for t in x for a in angle])
+        share = np.clip(0.5 + points[:, 0] / 1.2, 0, 1)
+        matrices = [turned((0, 1, 0), 0.0), turned((0, 1, 0), np.pi / 2)]
+        twist = [turned((1, 0, 0), 0.0), turned((1, 0, 0), 0.9 * np.pi)]
+        weights = np.column_stack([1 - share, share])
+        for pose, most in ((matrices, 0.05), (twist, 0.05)):
+            volumes = [
+                volume(core.skin(points, weights, pose, dual_quaternions=dual), 40) / volume(points, 40)
+                for dual in (False, True)
+            ]
+            assert abs(volumes[1] - 1.0) < most
+            assert abs(volumes[0] - 1.0) > abs(volumes[1] - 1.0)
+
+    def test_sparse_weights_are_the_same(self):
+        matrices = [turned((1, 0, 1), 0.8), turned((0, 1, 0), -0.9), turned((1, 1, 1), 2.0)]
+        found = core.skin(self.points, sparse.csr_array(self.weights), matrices)
+        assert np.array_equal(found, core.skin(self.points, self.weights, matrices))
+
+    @pytest.mark.parametrize(
+        ("weights", "matrices", "text"),
+        [
+            (np.ones((200, 2)), np.zeros((3, 3, 4)), "Weights have the shape"),
+            (np.ones((200, 1)), np.zeros((1, 3, 3)), "Matrices have the shape"),
+            (np.full((200, 1), np.nan), np.zeros((1, 3, 4)), "not finite"),
+        ],
+    )
+    def test_bad_input_is_refused(self, weights, matrices, text):
+        with pytest.raises(core.InvalidPointsError, match=text):
+            core.skin(self.points, weights, matrices)
+
+
+def volume(points, around):
+    """Volume of a tube of rings of so many points, by the divergence theorem over its triangles and two end discs."""
+    rings = points.reshape(-1, around, 3)
+    a, b = rings[:-1], rings[1:]
+    c, d = np.roll(a, -1, axis=1), np.roll(b, -1, axis=1)
+    total = sum(np.einsum("rpi,rpi->", p, np.cross(q, r)) for p, q, r in ((a, b, c), (b, d, c)))
+    for ring, sign in ((rings[0], 1.0), (rings[-1], -1.0)):
+        total += sign * np.einsum("pi,pi->", ring, np.cross(np.roll(ring, -1, axis=0), ring.mean(axis=0)[None]) * -1.0)
+    return abs(total) / 6.0
