@@ -11,5 +11,5 @@ from .factors import dissect, sparsify
 from .hierarchy import Rows
 from .lanczos import lift_lowest
 from .rotations import TRACE, nearest_rotations, rotations_in_groups
-from .solvers import Iterate, bounded_quadratic, conjugate_gradients, solve_symmetric
+from .solvers import Iterate, bounded_quadratic, conjugate_gradients, solve_columns, solve_symmetric
 from .two_grid import TwoGrid

@@ -276,7 +276,7 @@ def approximate_inverse(matrix: sparse.csr_array, pool: ThreadPoolExecutor, repo
     Returns
     -------
     LinearOperator, (n, n), or None
-        A V-cycle in single precision; None where coarse versions do not help.
+        A V-cycle in single precision, of one column or several at once; None where coarse versions do not help.
     """
     levels, last, _ = build_levels(matrix, np.ones(matrix.shape[0]), SMALL, 0, pool, report)
     if not levels or last.shape[0] > SMALL:
@@ -286,10 +286,13 @@ def approximate_inverse(matrix: sparse.csr_array, pool: ThreadPoolExecutor, repo
     inverse = pinvh(last.toarray())  # constants are its null space where nothing is fixed
 
     def multiply(load: Floats) -> Floats:
-        size = np.linalg.norm(load) or 1.0  # single precision has no smaller numbers than 1e-38
-        return size * _cycle(levels, inverse, (load[:, None] / size).astype(np.float32))[:, 0].astype(np.float64)
+        columns = load.reshape(len(load), -1)
+        size = np.linalg.norm(columns, axis=0)  # single precision has no smaller numbers than 1e-38
+        size[size == 0.0] = 1.0
+        result = _cycle(levels, inverse, (columns / size).astype(np.float32)).astype(np.float64)
+        return (size * result).reshape(load.shape)
 
-    return LinearOperator(matrix.shape, matvec=multiply, dtype=np.float64)
+    return LinearOperator(matrix.shape, matvec=multiply, matmat=multiply, dtype=np.float64)
 
 
 def _shorten(level: Level) -> None:

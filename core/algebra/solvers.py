@@ -11,7 +11,7 @@ from scipy import sparse
 
 from ..errors import SolverError
 from ..types import Array, Floats, Progress
-from .hierarchy import PART, approximate_inverse
+from .hierarchy import PART, Rows, approximate_inverse
 
 _STEPS = 20_000  # of `solve_symmetric`, at most
 _FEW = 20_000  # unknowns up to which coarse versions, which cost as much as 120 to 150 steps, do not pay
@@ -160,6 +160,56 @@ def solve_symmetric(
                 )
             values[number] = found.values * unit
     return values.T.reshape(load.shape)
+
+
+def solve_columns(matrix: sparse.csr_array, loads: Floats, rtol: float, report: Callable[[float], None]) -> Floats:
+    """Solve positive definite equations for many right-hand sides at once, by conjugate gradients of each.
+
+    Parameters
+    ----------
+    matrix : csr_array, (m, m)
+        Symmetric positive definite.
+    loads : ndarray, (m, k)
+    rtol : float
+        Of the residual of each column against its load.
+    report : callable
+        Called with the share that is done; may raise `Cancelled`.
+
+    Returns
+    -------
+    ndarray, (m, k)
+
+    Raises
+    ------
+    SolverError
+        No convergence.
+    """
+    values, residual = np.zeros_like(loads), loads.copy()
+    unit = np.linalg.norm(loads, axis=0)
+    unit[unit == 0.0] = 1.0
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        rows = Rows(matrix, pool, lambda: report(0.0))
+        inverse = approximate_inverse(matrix, pool, lambda: report(0.0))
+        scaling = inverse or sparse.diags_array(1.0 / matrix.diagonal())
+        direction, moment, left = None, np.ones(loads.shape[1]), 1.0
+        for _ in range(_STEPS):
+            left = float((np.linalg.norm(residual, axis=0) / unit).max(initial=0.0))
+            if left <= rtol:
+                return values
+            report(min(np.log(left) / np.log(rtol), 1.0) if left < 1.0 else 0.0)
+            scaled = scaling @ residual
+            moment, previous = np.einsum("ij,ij->j", residual, scaled), moment
+            direction = scaled if direction is None else scaled + _ratio(moment, previous) * direction
+            image = rows @ direction
+            length = _ratio(moment, np.einsum("ij,ij->j", direction, image))
+            values += length * direction
+            residual -= length * image
+    raise SolverError(f"The equations of {len(loads)} points were not solved: a share of {left:.1g} is left.")
+
+
+def _ratio(numbers: Floats, others: Floats) -> Floats:
+    """Return quotients, zero where a column is solved, so that both are."""
+    return np.divide(numbers, others, out=np.zeros_like(numbers), where=others != 0.0)
 
 
 def bounded_quadratic(

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,16 +10,15 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..algebra import Rows, blocks, dissect, factorize, on_all_cores
+from ..algebra import blocks, on_all_cores, solve_columns, sparsify
 from ..arguments import as_doubles, check_array, check_finite, check_switches, not_negative, positive, whole
 from ..errors import InvalidPointsError, PointCloudError
 from ..operator import LaplaceBeltrami
 from ..types import Bools, Floats, Ints, Progress
 from .inside import Inside
-from .reduced import Reduced, reduce
 
 _SAME = 1e-3  # of the distance to the nearest bone, within which others are as near
-_SMOOTHING = 3  # steps in which the weights of some points, carried to all, become those of the surface there
+_ACCURACY = 2e-4  # of the equations: weights are right to 1e-4
 _BLOCK = 1 << 12
 _SAMPLES = 64  # places along a bone that are inside or not
 _INSIDE = 0.5  # winding number from which a place is inside
@@ -84,8 +81,6 @@ def bone_weights(
     between 0 and 1 and sum to one by themselves. What lies inside is told by winding numbers of areas and normals, so
     that it needs no faces. On a component of which no point sees a bone, that is not asked for.
 
-    Of many points some are solved on; their weights are carried to the others, and relaxed there.
-
     References
     ----------
     Baran, Popovic. Automatic rigging and animation of 3D characters. ACM Trans. Graph. 26, 2007.
@@ -115,14 +110,12 @@ def bone_weights(
     report("Bones", 0.0)
     kept = np.flatnonzero(laplacian.component >= 0)
     distance, near = _seen_bones(laplacian, kept, heads, tails, visible, report)
-    rate = 2.0 * near.sum(axis=1) / (width * distance) ** 2
-    report("Weights", 0.2)
-    few = reduce(laplacian, lambda stage, fraction: report("Weights", 0.2 + 0.2 * fraction))
-    own = np.searchsorted(kept, few.rows)
-    result = few.carry(_equilibrium(few, few.areas * rate[own], near[own], report))
-    if not few.all_points:
-        stiffness, heat = laplacian.stiffness[kept][:, kept], laplacian.areas[kept] * rate
-        result[kept] = _relax(stiffness, heat, near, result[kept], report)
+    heat = 2.0 * laplacian.areas[kept] * near.sum(axis=1) / (width * distance) ** 2
+    result = np.empty((len(laplacian.points), len(heads)))
+    result[kept] = _equilibrium(laplacian, kept, heat, near, report)
+    lone = np.flatnonzero(laplacian.component < 0)
+    if len(lone):
+        result[lone] = result[kept[cKDTree(laplacian.points[kept]).query(laplacian.points[lone])[1]]]
     return strongest(result, most, least)
 
 
@@ -238,32 +231,29 @@ def _nearest_places(points: Floats, first: Floats, last: Floats) -> Floats:
     return first + np.clip(share, 0.0, 1.0)[:, :, None] * along
 
 
-def _relax(
-    stiffness: sparse.csr_array, heat: Floats, near: sparse.csr_array, weights: Floats, report: Progress
+def _equilibrium(
+    laplacian: LaplaceBeltrami, kept: Ints, heat: Floats, near: sparse.csr_array, report: Progress
 ) -> Floats:
-    """Return weights after some steps of Jacobi's method, each a mean of those around."""
-    diagonal = stiffness.diagonal() + heat
-    load = sparse.diags_array(heat / diagonal) @ near
-    around = (sparse.diags_array(1.0 / diagonal) @ (sparse.diags_array(stiffness.diagonal()) - stiffness)).tocsr()
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        rows = Rows(around, pool, lambda: report("Weights", 0.9))
-        for _ in range(_SMOOTHING):
-            weights = load + rows @ weights
-    return np.asarray(weights)
-
-
-def _equilibrium(few: Reduced, heat: Floats, near: sparse.csr_array, report: Progress) -> Floats:
     """Return the weights of points in equilibrium, (m, b); components without heat have those of the nearest other."""
-    stiffness, points = few.stiffness, few.points
+    points = laplacian.surface_points[kept]
+    stiffness = _apart(sparsify(laplacian.stiffness[kept][:, kept]), laplacian.normals[kept])
     component = connected_components(stiffness, directed=False)[1]
     warm = np.bincount(component, heat)[component] > 0.0
     rows, cold = np.flatnonzero(warm), np.flatnonzero(~warm)
+    rows = rows[cKDTree(points[rows]).indices]  # neighbours near in memory make the products faster
     matrix = (stiffness[rows][:, rows] + sparse.diags_array(heat[rows])).tocsr()
-    order, starts = dissect(matrix, points[rows], lambda: report("Weights", 0.5))
-    rows = rows[order]
-    solve = factorize(matrix[order][:, order], starts, lambda share: report("Weights", 0.5 + 0.3 * share))
+    load = (sparse.diags_array(heat[rows]) @ near[rows]).toarray()
     result = np.empty(near.shape)
-    result[rows] = solve((sparse.diags_array(heat[rows]) @ near[rows]).toarray())
+    result[rows] = solve_columns(matrix, load, _ACCURACY, lambda share: report("Weights", 0.3 + 0.7 * share))
     if len(cold):
         result[cold] = result[rows[cKDTree(points[rows]).query(points[cold])[1]]]
-    return np.maximum(result, 0.0)
+    return result
+
+
+def _apart(stiffness: sparse.csr_array, normals: Floats) -> sparse.csr_array:
+    """Leave out pairs whose normals differ by more than a right angle: sheets that touch, as a hand and a hip."""
+    pairs = stiffness.tocoo()
+    first, second = pairs.coords
+    same = (np.einsum("ij,ij->i", normals[first], normals[second]) > 0.0) & (first != second)
+    weights = sparse.csr_array((-pairs.data[same], (first[same], second[same])), shape=stiffness.shape)
+    return (sparse.diags_array(weights.sum(axis=1), format="csr") - weights).tocsr()

@@ -29,8 +29,6 @@ class Reduced:
         On the surface [L].
     stiffness : csr_array, (m, m)
     areas : ndarray, (m,)
-    all_points : bool
-        Whether these are all that the operator does not leave out.
     carry : callable
         From values (m, k) to those of all points, (n, k); points that are left out have those of the nearest one.
     """
@@ -39,7 +37,6 @@ class Reduced:
     points: Floats
     stiffness: sparse.csr_array
     areas: Floats
-    all_points: bool
     carry: Callable[[Floats], Floats]
 
 
@@ -57,7 +54,7 @@ def reduce(laplacian: LaplaceBeltrami, report: Progress) -> Reduced:
 
     if len(kept) <= _MOST:
         stiffness = sparsify(laplacian.stiffness[kept][:, kept])
-        return Reduced(kept, points, stiffness, laplacian.areas[kept], True, complete)
+        return Reduced(kept, points, stiffness, laplacian.areas[kept], complete)
     report("Points", 0.0)
     some = kept[blue_noise_subset(points, _MOST)]
     few = narrow_laplacian(laplacian, rows=some, progress=lambda stage, share: report("Points", share))
@@ -70,4 +67,4 @@ def reduce(laplacian: LaplaceBeltrami, report: Progress) -> Reduced:
         low, high = values.min(axis=0), values.max(axis=0)
         return complete(np.clip(every.interpolate(values), low, high))
 
-    return Reduced(rows, surface, few.stiffness[on][:, on], few.areas[on], False, carry)
+    return Reduced(rows, surface, few.stiffness[on][:, on], few.areas[on], carry)

@@ -121,7 +121,6 @@ BELOW = {  # what each wing of core may use
 }
 SIDEWAYS = {  # applications that build on others
     ("bone_weights", "inside"),
-    ("bone_weights", "reduced"),
     ("coarse_deformation", "deformation"),
     ("deformation", "gradients"),
     ("deformation", "graph"),

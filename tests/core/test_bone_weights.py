@@ -83,17 +83,6 @@ class TestBoneWeights:
             found.append(weights)
         assert found[0].interpolate(found[1])[-6:] == pytest.approx(found[2].interpolate(found[3])[-6:], abs=0.03)
 
-    def test_many_points_are_solved_on_some(self, monkeypatch):
-        points = random_sphere(6000)
-        laplacian = core.build_laplacian(points)
-        ends = np.zeros((2, 3)), np.array([[0, 0, 0.8], [0, 0, -0.8]])
-        whole = core.bone_weights(laplacian, *ends)
-        monkeypatch.setattr("core.applications.reduced._MOST", 1500)
-        some = core.bone_weights(laplacian, *ends)
-        assert not np.array_equal(whole, some)
-        assert np.abs(whole - some).max() < 0.05
-        assert np.abs(whole - some).mean() < 0.01
-
     def test_no_bone_warms_what_it_does_not_see(self):
         """Two balls beside each other, a bone in each: the half of a ball that is nearer to the other's bone is not."""
         ball = fibonacci_sphere(1500)
