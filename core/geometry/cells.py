@@ -9,13 +9,14 @@ import numpy as np
 
 from ..algebra import blocks, on_all_cores
 from ..types import Bools, Floats, Ints, Report
-from .distances import arc_squared
+from .distances import arc_squared, bent_squared
 from .nearest import COUNT, Nearest
 from .quadrics import CURVED, frames
 from .sheets import on_sheet
 
 if TYPE_CHECKING:
     from .boundary import Boundary
+    from .edges import Sides
 
 _BLOCK = 1 << 12
 _SAME = 1e-9  # share of the longest cut, or of their product, by which two that differ are one
@@ -48,6 +49,7 @@ def measure_cells(
     component: Ints | None = None,
     report: Report = lambda: None,
     before: Cells | None = None,
+    sides: Sides | None = None,
 ) -> Cells:
     """Measure the cell of every point in geodesic polar coordinates around it.
 
@@ -70,6 +72,8 @@ def measure_cells(
         Called now and then; may raise `Cancelled`.
     before : Cells, optional
         Of the same points without the boundary: only those near it are measured again.
+    sides : Sides, optional
+        Of the points, with the same normals, for ways over edges; without them all ways are arcs.
 
     Returns
     -------
@@ -90,7 +94,7 @@ def measure_cells(
 
         def measure(part: slice, rows: Ints = rows, many: int = many, still_open: Bools = still_open) -> None:
             block = rows[part]
-            cuts, furthest = _cuts(nearest, normals, gaussian_curvature, boundary, component, block, many)
+            cuts, furthest = _cuts(nearest, normals, gaussian_curvature, boundary, component, block, many, sides)
             areas, radius, closed = _intersect(cuts, gaussian_curvature[block], 0.5 * furthest)
             known = np.flatnonzero(closed)
             if many == COUNT and not closed.all():
@@ -115,6 +119,7 @@ def _cuts(
     component: Ints,
     rows: Ints,
     many: int,
+    sides: Sides | None,
 ) -> tuple[Floats, Floats]:
     """Return the cuts of some points by so many neighbours, (k, cuts, 2), and how far away the last of these is.
 
@@ -138,6 +143,14 @@ def _cuts(
     other = np.where(cosine < 0.0, -1.0, 1.0)[:, :, None] * other
     left, right = np.einsum("ikc,ic->ik", chord, own), np.einsum("ikc,ikc->ik", chord, other)
     squared = arc_squared(distance**2, left, right, np.abs(cosine))
+    if sides is not None:
+        sure = np.maximum(sides.sharp[rows, None], sides.sharp[index])
+        edged = np.nonzero(sure)
+        side = np.where(cosine[edged] < 0.0, -1.0, 1.0)[:, None, None]
+        form = sides.shape_operator[rows[edged[0]]] + side * sides.shape_operator[index[edged]]
+        turn = 0.5 * np.einsum("pa,pab,pb->p", chord[edged], form, chord[edged])
+        heights = left[edged], right[edged]
+        squared[edged] = bent_squared(distance[edged] ** 2, *heights, np.abs(cosine[edged]), turn, sure[edged])
     # The direction of the arc at the point, from its chord and a third of the angle between the normals.
     step = (chord + ((right - left) / 6.0)[:, :, None] * other) @ frame
     length = 0.5 * np.sqrt(squared) * (1.0 + np.clip(gaussian_curvature[rows, None] * squared / 12.0, -CURVED, CURVED))

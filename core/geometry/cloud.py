@@ -17,6 +17,7 @@ from .cells import Cells, measure_cells
 from .components import label_components, move_apart
 from .distances import measure_squared_slope
 from .doubt import likely_causes
+from .edges import Sides, find_sides, one_side
 from .nearest import Nearest, find_nearest
 from .noise import FALLING, FILLING, LEFT, mean_misfits, near_misfit, noise_level, project_points
 from .normals import unit_normals
@@ -96,6 +97,8 @@ class Cloud:
         Component of each point.
     normals : ndarray, (m, 3)
         Unit normals.
+    sides : Sides
+        The smooth sides that the points lie on, between edges, towards the same side of the surface.
     moved : ndarray, (m, 3)
         Offsets by which the points were moved to smooth noise.
     shape_operator : ndarray, (m, 3, 3)
@@ -124,6 +127,7 @@ class Cloud:
     scaled: ScaledPoints
     component: Ints
     normals: Floats
+    sides: Sides
     moved: Floats
     shape_operator: Floats
     gaussian_curvature: Floats
@@ -183,11 +187,12 @@ def read_cloud(
 
     report("Neighbors", 0.2)
     gaussian = quadrics.gaussian_curvature
+    sides = one_side(quadrics, oriented) if given is not None else find_sides(nearest, quadrics).toward(oriented)
     gaps, edge = None, no_boundary(len(oriented))
 
     def cells_within(boundary: Boundary, before: Cells | None = None) -> Cells:
         reported = functools.partial(report, "Neighbors", 0.2)
-        return measure_cells(nearest, oriented, gaussian, boundary, sample.component, reported, before)
+        return measure_cells(nearest, sides.normals, gaussian, boundary, sample.component, reported, before, sides)
 
     cells = cells_within(edge)
     if options.boundary == "auto" and boundary is None and boundary_distance is None:
@@ -207,6 +212,7 @@ def read_cloud(
         scaled=sample.scaled,
         component=sample.component,
         normals=own,
+        sides=sides,
         moved=sample.moved,
         shape_operator=side[:, None, None] * quadrics.shape_operator,
         gaussian_curvature=gaussian,
@@ -215,7 +221,7 @@ def read_cloud(
         spacing=nearest.spacing,
         misfit=quadrics.misfit,
         # Where noise was smoothed, slopes are noise.
-        squared_slope=np.where(sample.noise > 0.0, 0.0, measure_squared_slope(nearest, quadrics.normals)),
+        squared_slope=np.where(sample.noise > 0.0, 0.0, measure_squared_slope(nearest, sides.normals)),
         cause=likely_causes(nearest, oriented, cells, sample.scatter),
         boundary=edge,
         pairs=pairs,

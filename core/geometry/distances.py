@@ -35,6 +35,28 @@ def arc_squared(squared: Floats, left: Floats, right: Floats, cosine: Floats | f
     return squared + (right - left) ** 2 * (1.0 / 12.0 + (1.0 - cosine) / 45.0) + (left + right) ** 2 / 20.0
 
 
+def bent_squared(squared: Floats, left: Floats, right: Floats, cosine: Floats, turn: Floats, sharp: Floats) -> Floats:
+    """Return the squared length of the shortest ways over chords where edges may lie between their ends.
+
+    Over the edge in which two planes meet it has two legs: ``s^2 = r^2 - 2 d e / (1 + cosine)``. What the normals turn
+    by more than the surface bends is taken for an edge, as far as one is sure, and the rest for that of `arc_squared`.
+
+    Parameters
+    ----------
+    squared, left, right, cosine : ndarray
+        As of `arc_squared`; the cosine is not negative.
+    turn : ndarray
+        What e - d would be by the curvatures at both ends.
+    sharp : ndarray
+        From 0 to 1, how sure an edge is.
+    """
+    arc = arc_squared(squared, left, right, cosine)
+    change = right - left
+    share = sharp * np.clip(1.0 - turn / np.where(change == 0.0, 1.0, change), 0.0, 1.0)
+    legs = squared - 2.0 * left * right / (1.0 + cosine)
+    return np.where(left * right < 0.0, arc + share * (legs - arc), arc)
+
+
 def circle_arc(chord: Floats, sine: Floats) -> Floats:
     """Return the length of circular arcs over chords, to all orders, by the sine of half their angle, |t| / (2 r)."""
     return chord * np.where(sine > 1e-4, np.arcsin(sine) / np.maximum(sine, 1e-4), 1.0)
@@ -43,9 +65,9 @@ def circle_arc(chord: Floats, sine: Floats) -> Floats:
 def arc_length(cloud: Cloud) -> Floats:
     """Return the length of the arc that joins each pair within the surface.
 
-    That of `arc_squared`, and ``g max(r^2 - a^2, 0)`` more: the path up and down over a roughness finer than the
-    normals resolve, of mean squared slope g, the mean of both ends. Between points one spacing a apart the chord is
-    that path.
+    That of `arc_squared`, or of `bent_squared` where an edge is near, and ``g max(r^2 - a^2, 0)`` more: the path up and
+    down over a roughness finer than the normals resolve, of mean squared slope g, the mean of both ends. Between points
+    one spacing a apart the chord is that path.
 
     Parameters
     ----------
@@ -59,13 +81,22 @@ def arc_length(cloud: Cloud) -> Floats:
     """
     pairs, steep = cloud.pairs, cloud.squared_slope.any()
     result = np.empty(len(pairs.first))
-    points, normals = pairs.points.T.copy(), cloud.normals.T.copy()
+    points, normals = pairs.points.T.copy(), cloud.sides.normals.T.copy()
+    forms, sharp = cloud.sides.shape_operator, cloud.sides.sharp
 
     def measure(patch: Patch) -> None:
-        _, left, right, cosine = pair_heights(patch.first, patch.second, points, normals)
-        right = np.where(cosine < 0.0, -right, right)
+        chord, left, right, cosine = pair_heights(patch.first, patch.second, points, normals)
+        side = np.where(cosine < 0.0, -1.0, 1.0)
+        right, cosine = side * right, np.abs(cosine)
         squared = pairs.distance[patch.pairs] ** 2
-        arc = arc_squared(squared, left, right, np.abs(cosine))
+        arc = arc_squared(squared, left, right, cosine)
+        sure = np.maximum(patch.first(sharp), patch.second(sharp))
+        edged = np.flatnonzero(sure)
+        if len(edged):
+            first, second = (ends[patch.pairs][edged] for ends in (pairs.first, pairs.second))
+            form = forms[first] + side[edged, None, None] * forms[second]
+            turn = 0.5 * np.einsum("ap,pab,bp->p", chord[:, edged], form, chord[:, edged])
+            arc[edged] = bent_squared(squared[edged], left[edged], right[edged], cosine[edged], turn, sure[edged])
         if steep:
             arc += patch.mean(cloud.squared_slope) * np.maximum(squared - patch.mean(cloud.spacing) ** 2, 0.0)
         result[patch.pairs] = np.sqrt(arc)

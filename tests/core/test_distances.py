@@ -6,6 +6,7 @@ import pytest
 from benchmarks.samplings import fibonacci_sphere, open_cylinder
 from core.geometry.cloud import read_cloud
 from core.geometry.distances import arc_length
+from core.geometry.edges import Sides
 from core.options import LaplacianOptions
 
 
@@ -37,7 +38,7 @@ def test_arcs_are_exact_to_sixth_order(points, normals, exact, sign):
     cloud = replace(
         cloud,
         pairs=pairs,
-        normals=(normals(pairs.points).T * sides).T,
+        sides=Sides((normals(pairs.points).T * sides).T, cloud.shape_operator, np.zeros(len(pairs.points))),
         squared_slope=np.zeros(len(pairs.points)),
     )
     length = exact(pairs.points[i], pairs.points[j])

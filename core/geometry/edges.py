@@ -1,0 +1,84 @@
+"""Edges: the normal and the bend of the smooth side that each point lies on, from neighbours on that side alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..algebra import blocks, on_all_cores
+from ..types import Floats
+from .nearest import Nearest
+from .quadrics import Quadrics, fit_quadrics
+
+_MISSED = 0.05  # spacings by which a quadric misses its neighbours, at least, where an edge is looked for
+_AGREE = 0.25  # angle between normals of one side: a neighbour's weight falls with it as a normal distribution does
+_ROUNDS = 3  # of fits, each by the normals of the last
+_COEFFICIENTS = 6  # of a quadric
+_BLOCK = 1 << 12  # points fitted at one time
+
+
+@dataclass(frozen=True)
+class Sides:
+    """The smooth side that each point lies on, up to the edges next to it.
+
+    Attributes
+    ----------
+    normals : ndarray, (m, 3)
+        Unit normals.
+    shape_operator : ndarray, (m, 3, 3)
+        As of `Quadrics`.
+    sharp : ndarray, (m,)
+        How sure it is that an edge is near, from 0 to 1. At zero, normal and bend are those of the quadric.
+    """
+
+    normals: Floats
+    shape_operator: Floats
+    sharp: Floats
+
+    def toward(self, normals: Floats) -> Sides:
+        """Return the same, seen from where normals of the surface, (m, 3), point."""
+        side = np.where(np.einsum("ij,ij->i", normals, self.normals) < 0.0, -1.0, 1.0)
+        return Sides(side[:, None] * self.normals, side[:, None, None] * self.shape_operator, self.sharp)
+
+
+def one_side(quadrics: Quadrics, normals: Floats) -> Sides:
+    """Return the sides of a surface without edges, by its normals, (m, 3)."""
+    return Sides(normals, quadrics.shape_operator, np.zeros(len(normals)))
+
+
+def find_sides(nearest: Nearest, quadrics: Quadrics) -> Sides:
+    """Fit quadrics again where they miss their neighbours, to those whose normals agree.
+
+    Across an edge normals differ more and more with each such fit, on each side they agree; where the surface is round
+    or noisy the fit stays much the same. How sure an edge is follows from what is left of the misfit, by as many
+    neighbours as it has more than coefficients.
+
+    Parameters
+    ----------
+    nearest : Nearest
+        Of m points.
+    quadrics : Quadrics
+        Of the points.
+    """
+    rows = np.flatnonzero(quadrics.misfit > _MISSED * nearest.spacing)
+    normals, form, sharp = quadrics.normals.copy(), quadrics.shape_operator.copy(), np.zeros(len(quadrics.normals))
+    for _ in range(_ROUNDS):
+        last = normals.copy()
+
+        def fit(part: slice, last: Floats = last) -> None:
+            some = rows[part]
+            index = nearest.index[some]
+            cosine = np.abs(np.einsum("ikc,ic->ik", last[index], last[some]))
+            weight = nearest.weight[some] * np.exp((cosine - 1.0) * (2.0 / _AGREE**2))
+            fitted = fit_quadrics(nearest.points, index, weight, some, last[some])
+            normals[some], form[some] = fitted.normals, fitted.shape_operator
+            count = weight.sum(axis=1) ** 2 / (weight**2).sum(axis=1)
+            free = np.maximum(1.0 - _COEFFICIENTS / count, 1e-12)
+            left = fitted.misfit / (np.sqrt(free) * quadrics.misfit[some])
+            sharp[some] = 1.0 - np.sqrt(np.minimum(left, 1.0))
+
+        on_all_cores(fit, blocks(len(rows), _BLOCK))
+    lost = rows[sharp[rows] == 0.0]
+    normals[lost], form[lost] = quadrics.normals[lost], quadrics.shape_operator[lost]
+    return Sides(normals, form, sharp)
