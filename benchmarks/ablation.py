@@ -20,6 +20,7 @@ from core.geometry import (
     cloud,
     components,
     distances,
+    edges,
     moments,
     nearest,
     noise,
@@ -43,15 +44,29 @@ from .samplings import fibonacci_sphere, random_sphere
 from .tables import Table
 
 MODULES = (
-    *(nearest, outliers, components, quadrics, rows, sheets, noise, boundary, cells, moments, bandwidth, distances),
+    *(
+        nearest,
+        outliers,
+        components,
+        quadrics,
+        rows,
+        sheets,
+        noise,
+        edges,
+        boundary,
+        cells,
+        moments,
+        bandwidth,
+        distances,
+    ),
     *(cloud, areas, weights, images, curvature, stiffness),
 )
 UNTUNED = {  # why a number is no constant: its names, with the module where others have the same one
     "how much is done at one time": ("_BLOCK", "_SOURCES", "_NEARBY", "areas._MANY", "nearest._MEASURED"),
     "how many neighbors are searched among": ("moments._MORE", "rows._WIDER", "boundary._REACH"),
     "what is lost in rounding": ("_SAME", "_EVEN", "_SMALLEST", "_RIDGE", "_AT_BOUNDARY", "cells._CLOSEST", "NO_AREA"),
-    "rounds after which an iteration has long ended": ("moments._STEPS",),
-    "how many terms there are": ("TERMS",),
+    "rounds after which an iteration has long ended": ("moments._STEPS", "edges._ROUNDS"),
+    "how many terms there are": ("TERMS", "edges._COEFFICIENTS"),
     "what only a notice or a drawing goes by": ("_NARROW", "bandwidth._STEPS", "cloud._DRAWN"),
 }
 DOCUMENT = Path(__file__).parents[1] / "docs" / "ablation.md"

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..algebra import blocks, on_all_cores
-from ..types import Floats
-from .nearest import Nearest
+from ..types import Floats, Ints
+from .moments import MET
+from .nearest import POWER, SMOOTH, Nearest
+from .noise import LEFT
 from .quadrics import Quadrics, fit_quadrics
 
-_MISSED = 0.05  # spacings by which a quadric misses its neighbours, at least, where an edge is looked for
-_AGREE = 0.25  # angle between normals of one side: a neighbour's weight falls with it as a normal distribution does
-_ROUNDS = 3  # of fits, each by the normals of the last
+_ROUNDS = 20  # of fits, each by the normals of the last; nearly all points need fewer
 _COEFFICIENTS = 6  # of a quadric
 _BLOCK = 1 << 12  # points fitted at one time
 
@@ -48,7 +48,7 @@ def one_side(quadrics: Quadrics, normals: Floats) -> Sides:
 
 
 def find_sides(nearest: Nearest, quadrics: Quadrics) -> Sides:
-    """Fit quadrics again where they miss their neighbours, to those whose normals agree.
+    """Fit quadrics again where they miss their neighbours, to those whose normals agree, until normals turn no more.
 
     Across an edge normals differ more and more with each such fit, on each side they agree; where the surface is round
     or noisy the fit stays much the same. How sure an edge is follows from what is left of the misfit, by as many
@@ -61,24 +61,31 @@ def find_sides(nearest: Nearest, quadrics: Quadrics) -> Sides:
     quadrics : Quadrics
         Of the points.
     """
-    rows = np.flatnonzero(quadrics.misfit > _MISSED * nearest.spacing)
+    rows = np.flatnonzero(quadrics.misfit > LEFT * nearest.spacing)
     normals, form, sharp = quadrics.normals.copy(), quadrics.shape_operator.copy(), np.zeros(len(quadrics.normals))
+    turning = rows
     for _ in range(_ROUNDS):
         last = normals.copy()
 
-        def fit(part: slice, last: Floats = last) -> None:
-            some = rows[part]
+        def fit(part: slice, last: Floats = last, turning: Ints = turning) -> None:
+            some = turning[part]
             index = nearest.index[some]
             cosine = np.abs(np.einsum("ikc,ic->ik", last[index], last[some]))
-            weight = nearest.weight[some] * np.exp((cosine - 1.0) * (2.0 / _AGREE**2))
+            weight = nearest.weight[some] * np.maximum((cosine - SMOOTH) / (1.0 - SMOOTH), 0.0) ** POWER
+            count = weight.sum(axis=1) ** 2 / np.maximum((weight**2).sum(axis=1), 1e-300)
+            enough = count > _COEFFICIENTS
+            sharp[some[~enough]] = 0.0
+            some, index, weight, count = some[enough], index[enough], weight[enough], count[enough]
             fitted = fit_quadrics(nearest.points, index, weight, some, last[some])
             normals[some], form[some] = fitted.normals, fitted.shape_operator
-            count = weight.sum(axis=1) ** 2 / (weight**2).sum(axis=1)
-            free = np.maximum(1.0 - _COEFFICIENTS / count, 1e-12)
-            left = fitted.misfit / (np.sqrt(free) * quadrics.misfit[some])
+            left = fitted.misfit / (np.sqrt(1.0 - _COEFFICIENTS / count) * quadrics.misfit[some])
             sharp[some] = 1.0 - np.sqrt(np.minimum(left, 1.0))
 
-        on_all_cores(fit, blocks(len(rows), _BLOCK))
+        on_all_cores(fit, blocks(len(turning), _BLOCK))
+        turned = 1.0 - np.abs(np.einsum("ij,ij->i", normals[turning], last[turning]))
+        turning = turning[turned > MET]
+        if not len(turning):
+            break
     lost = rows[sharp[rows] == 0.0]
     normals[lost], form[lost] = quadrics.normals[lost], quadrics.shape_operator[lost]
     return Sides(normals, form, sharp)
