@@ -218,6 +218,6 @@ def _polynomial(matrix: KernelMatrix, root: Floats, residual: Floats, held: Bool
 @functools.cache
 def _inverse(degree: int) -> Floats:
     """Return a Chebyshev series over [-1, 1]: 1 / x for x well above the width, about zero from there down."""
-    width = np.pi / degree  # what a polynomial of that degree separates from zero: the distance between its zeros there
+    width = 0.5 * np.pi / degree  # half the distance between its zeros there, what it separates from zero
     series: Floats = chebyshev.chebinterpolate(lambda x: expit(2.0 * x / width) * x / (x * x + width * width), degree)
     return series
