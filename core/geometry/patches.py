@@ -53,10 +53,10 @@ class Patch:
 
     def over_second(self, *values: Floats) -> Floats:
         """Return the sums of quantities of pairs, (pairs,) each, over the pairs of each second point, (q, l)."""
-        result, none = np.empty((len(values), len(self.columns))), self.ends.data
+        result, ones, none = np.empty((len(values), len(self.columns))), np.ones(len(self.rows)), self.ends.data
         for row, total in zip(values, result, strict=True):
             self.ends.data = row
-            total[:] = self.ends @ np.ones(len(self.rows), dtype=row.dtype)
+            total[:] = self.ends @ ones
         self.ends.data = none
         return result
 

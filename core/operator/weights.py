@@ -11,7 +11,7 @@ import numpy as np
 from ..algebra import Anderson, inverses, on_all_cores
 from ..geometry import LARGEST, MET, TERMS, EdgeTerms, dots, frames, put_terms
 from ..kernel import SECOND_MOMENT
-from ..types import Array, Floats, Ints, Report
+from ..types import Floats, Ints, Report
 from .curvature import second_moment, uneven
 
 if TYPE_CHECKING:
@@ -164,16 +164,12 @@ class _Moments:
         return self._sums(weighted, TERMS)
 
     def curvature(self, terms: Floats) -> Floats:
-        """Return the second derivatives of the entropy for the terms of each point alone, (m, 5, 5).
+        """Return the second derivatives of the entropy for the terms of each point alone, (m, 5, 5)."""
+        places, terms = [(i, j) for i in range(TERMS) for j in range(i + 1)], terms.T.copy()
 
-        In single precision: only the steps depend on them.
-        """
-        places = [(i, j) for i in range(TERMS) for j in range(i + 1)]
-        terms = terms.T.astype(np.float32, order="C")
-
-        def products(patch: Patch) -> list[list[Array]]:
-            basis = self._basis(patch, np.float32)
-            weighted = self._weights[patch.pairs].astype(np.float32) * _factor(patch, basis, terms) * basis
+        def products(patch: Patch) -> list[list[Floats]]:
+            basis = self._basis(patch)
+            weighted = self._weights[patch.pairs] * _factor(patch, basis, terms) * basis
             return [[own[i] * other[j] for i, j in places] for own, other in zip(weighted, basis, strict=True)]
 
         left, right = np.transpose(places)
@@ -185,9 +181,9 @@ class _Moments:
         """Return the sums of quantities of pairs at both ends, in the unit, (m, count)."""
         return (self._pairs.over_ends(values, count, self._report) / self._unit).T
 
-    def _basis(self, patch: Patch, precision: type[np.floating[Any]] = np.float64) -> Array:
+    def _basis(self, patch: Patch) -> Floats:
         """Return the terms of the pairs of a patch, (2, 5, pairs), as each end sees them."""
-        result = np.empty((2, TERMS, patch.pairs.stop - patch.pairs.start), dtype=precision)
+        result = np.empty((2, TERMS, patch.pairs.stop - patch.pairs.start))
         at_edges = self._at_edges[patch.pairs.start]
         for basis, offset, (rows, terms) in zip(result, self._offsets[:, :, patch.pairs], at_edges, strict=True):
             put_terms(offset[0], offset[1], basis)
@@ -195,9 +191,8 @@ class _Moments:
         return result
 
 
-def _factor(patch: Patch, basis: Array, terms: Array) -> Array:
+def _factor(patch: Patch, basis: Floats, terms: Floats) -> Floats:
     """Return the factor of the weights of a patch, from the terms of its pairs and their coefficients, (5, m)."""
     power = np.einsum("tp,tp->p", basis[0], patch.first(terms))
     power += np.einsum("tp,tp->p", basis[1], patch.second(terms))
-    power *= 0.5
-    return np.exp(np.clip(power, -LARGEST, LARGEST, out=power), out=power)
+    return np.exp(np.clip(0.5 * power, -LARGEST, LARGEST))
