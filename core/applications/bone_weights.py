@@ -101,12 +101,13 @@ def bone_weights(
     heads, tails = check_bones(heads, tails)
     width = positive(falloff, "falloff")
     check_switches(visible=visible)
-    most = len(heads) if influences is None else int(whole(influences))
+    most = len(heads) if influences is None else whole(influences)
     least = not_negative(least, "least weight")
-    if most < 1 or least >= 1.0:
+    if not most >= 1 or least >= 1.0:
         raise PointCloudError(
             f"Points follow {influences} bones with weights from {least} on. Use at least one, and less than 1."
         )
+    most = int(min(most, len(heads)))
     report("Bones", 0.0)
     kept = np.flatnonzero(laplacian.component >= 0)
     distance, near = _seen_bones(laplacian, kept, heads, tails, visible, report)

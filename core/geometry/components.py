@@ -5,12 +5,14 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from ..types import Bools, Floats, Ints
-from .nearest import COUNT, GAP, NEXT, Nearest
+from .nearest import COUNT, NEXT, Nearest
+
+_GAP = 2.0  # an edge longer than this many reaches to the 8th neighbour is a gap: more join clumps of outliers
 
 
 def even_reach(nearest: Nearest) -> Floats:
     """Return the edge that is a gap by how many points there are in any direction, (m,): that of points in rows."""
-    reach: Floats = GAP * np.sqrt(NEXT / np.pi) * nearest.spacing
+    reach: Floats = _GAP * np.sqrt(NEXT / np.pi) * nearest.spacing
     return reach
 
 
@@ -27,7 +29,7 @@ def label_components(nearest: Nearest) -> Ints:
         The largest component is 0. Those of fewer points than a neighbourhood has, 41, which get no operator, are -1.
     """
     index, distance = nearest.index[:, 1:], nearest.distance[:, 1:]
-    reach = GAP * distance[:, :NEXT][:, -1]  # of eight points there are seven neighbors
+    reach = _GAP * distance[:, :NEXT][:, -1]  # of eight points there are seven neighbors
     reach = np.where(nearest.in_row, even_reach(nearest), reach)
     strict = distance <= np.maximum(np.minimum(reach[:, None], reach[index]), np.median(reach))
     close = number_by_size(label_connected(index, strict), COUNT)

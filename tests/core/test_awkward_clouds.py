@@ -438,6 +438,11 @@ def calls():
     yield core.signature_times, of, {"count": 3}
     yield core.signature_energies, of, {"count": 3}
     yield core.harmonic_field, on, {"fixed": [0, 299], "fixed_values": [0.0, 1.0]}
+    bones = {"heads": [[0.0, 0.0, -0.8], [0.0, 0.0, 0.0]], "tails": [[0.0, 0.0, 0.0], [0.0, 0.0, 0.8]]}
+    yield core.bone_weights, on, {**bones, "falloff": 1.0, "visible": True, "influences": 1, "least": 0.1}
+    yield core.inpaint, on, {"known": [0, 299], "values": [0.0, 1.0], "biharmonic": True}
+    yield core.smooth_weights, on, {"weights": np.ones((n, 2)), "length": 0.1, "locked": [0]}
+    yield core.skin, {"gradients": False}, {"points": points, "weights": np.ones((n, 1)), "matrices": np.eye(4)[None]}
     yield core.solve_poisson, on, {"source": points[:, 2], "fixed": [0], "fixed_values": [0.0]}
     yield core.geodesic_distance, on, {"sources": [0]}
     yield core.Geodesics(laplacian).distance, {}, {"sources": [0]}
