@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -380,7 +380,9 @@ class _Line(NamedTuple):
         along = np.einsum("nkc,nkc->nk", offset, np.cross(self.normals, self.inward)[near])
         length = np.sqrt(np.einsum("nkc,nkc->nk", offset, offset))
         stretch = length / np.maximum(np.hypot(across, along), 1e-300)
-        signed = stretch * across - 0.5 * self.bend[near] * along**2
+        across, bend = stretch * across, self.bend[near]
+        # From the circle with the curvature of the line.
+        signed = (2.0 * across - bend * (across**2 + along**2)) / (1.0 + np.hypot(1.0 - bend * across, bend * along))
         facing = np.einsum("nkc,nc->nk", self.normals[near], laplacian.normals[rows]) > SMOOTH
         facing &= np.einsum("nkc,nc->nk", self.inward[near], self.inward[near[:, 0]]) > _PARALLEL
         facing &= (stretch < _STEEP) | (length < self.spacing[near])
@@ -424,39 +426,53 @@ class _Strip:
         self._along = np.cross(self._normals, self._rise)
 
     def fitted(self) -> Floats:
-        """Return the three coefficients of the most likely parabola around each point, (m, 3)."""
-        result = np.zeros((len(self._start), 3))
-        if not len(result):
-            return result
-        apart = move_apart(self._points, self._component)
-        tree = cKDTree(apart)
-        reach = np.hypot(_WINDOWS[1], 2.0 * _STRIP) * self._spacing
-        for rows in blocks(len(result), _BLOCK):
-            found = tree.query_ball_point(apart[rows], reach[rows], return_sorted=False)
-            row = np.repeat(np.arange(len(found)), [len(near) for near in found])
-            result[rows] = self._fit(rows, row, np.concatenate(found).astype(np.int64))
+        """Return the three coefficients of the most likely parabola around each point, (m, 3).
+
+        The window is as long as a parabola is close to the line, by first ones in short windows. Their curvature is
+        averaged, since a parabola that bends by chance would get a short window, and keep its chance there.
+        """
+        first, result = np.zeros((2, len(self._start), 3))
+        short, longest = _WINDOWS
+        for rows, row, other, t, n in self._pairs(short):
+            first[rows] = self._fit(rows, row, other, t, n, np.full(rows.stop - rows.start, short))
+        bend = first[:, 2] / (1.0 + first[:, 1] ** 2) ** 1.5
+        for rows, row, other, t, n in self._pairs(longest):
+            weight = np.maximum(1.0 - (t / short) ** 2, 0.0)
+            count = rows.stop - rows.start
+            mean = np.bincount(row, weight * bend[other], count) / np.bincount(row, weight, count)
+            window = np.clip(_TURN / np.maximum(np.abs(mean), 1e-12), _SHORTEST, longest)
+            result[rows] = self._fit(rows, row, other, t, n, window)
         return result
 
-    def _fit(self, rows: slice, row: Ints, other: Ints) -> Floats:
-        """Fit parabolas around some points, by pairs of their number among these, ascending, and another point.
+    def _pairs(self, window: float) -> Iterator[tuple[slice, Ints, Ints, Floats, Floats]]:
+        """Yield blocks of points, and their pairs with the points on the same line in a window.
 
-        The window is as long as a parabola is close to the line, by a first one in a short window.
+        A pair is the number of one point within its block, ascending, that of the other, and its place along the line
+        and across it.
         """
-        frame = np.stack([self._along[rows], self._rise[rows], self._normals[rows]], axis=1)
-        offset = (self._points[other] - self._points[rows][row]) / self._spacing[rows][row, None]
-        t, n, _ = np.einsum("pac,pc->ap", frame[row], offset)
-        same = np.einsum("pc,pc->p", self._normals[other], frame[row, 2]) > SMOOTH
-        same &= np.einsum("pc,pc->p", self._rise[other], frame[row, 1]) > _PARALLEL
-        begin = np.column_stack([self._start[rows], np.zeros((len(frame), 2))])
-        window = np.full(len(frame), _WINDOWS[0])
-        for _ in range(2):
-            kept = np.flatnonzero(same & (np.abs(t) < window[row]))
-            there = row[kept]
-            weight = (1.0 - (t[kept] / window[there]) ** 2) ** 2
-            likelihood = _Likelihood(there, len(frame), weight, t[kept], n[kept], self._sign[other[kept]])
-            found = likelihood.largest(begin)
-            window = np.clip(_TURN / np.maximum(np.abs(found[:, 2]), 1e-12), _SHORTEST, _WINDOWS[1])
-        return found
+        if not len(self._start):
+            return
+        apart = move_apart(self._points, self._component)
+        tree = cKDTree(apart)
+        reach = np.hypot(window, 2.0 * _STRIP) * self._spacing
+        for rows in blocks(len(apart), _BLOCK):
+            found = tree.query_ball_point(apart[rows], reach[rows], return_sorted=False)
+            row = np.repeat(np.arange(len(found)), [len(near) for near in found])
+            other = np.concatenate(found).astype(np.int64)
+            frame = np.stack([self._along[rows], self._rise[rows], self._normals[rows]], axis=1)
+            offset = (self._points[other] - self._points[rows][row]) / self._spacing[rows][row, None]
+            t, n, _ = np.einsum("pac,pc->ap", frame[row], offset)
+            same = np.einsum("pc,pc->p", self._normals[other], frame[row, 2]) > SMOOTH
+            same &= np.einsum("pc,pc->p", self._rise[other], frame[row, 1]) > _PARALLEL
+            yield rows, row[same], other[same], t[same], n[same]
+
+    def _fit(self, rows: slice, row: Ints, other: Ints, t: Floats, n: Floats, window: Floats) -> Floats:
+        """Fit parabolas around a block of points by pairs within a window around each, (r,)."""
+        kept = np.abs(t) < window[row]
+        row, t = row[kept], t[kept]
+        weight = (1.0 - (t / window[row]) ** 2) ** 2
+        likelihood = _Likelihood(row, len(window), weight, t, n[kept], self._sign[other[kept]])
+        return likelihood.largest(np.column_stack([self._start[rows], np.zeros((len(window), 2))]))
 
     def line(self, found: Floats) -> _Line:
         """Return the pieces of the line that the parabolas are."""

@@ -3,7 +3,7 @@ import pytest
 
 import core
 from benchmarks.samplings import random_sphere
-from core.applications.regions import _edge, _second, _slope, _step
+from core.applications.regions import _edge, _find_line, _Line, _second, _slope, _step
 
 
 def cap(points, degrees, axis=(0.3, -0.5, 0.8)):
@@ -21,6 +21,31 @@ def test_a_cap_of_random_points_has_the_area_and_the_circle_of_a_sphere(operator
     assert found.boundary_length == pytest.approx(length, rel=0.012)
     middle = 0.5 * (1.0 + np.cos(angle)) * np.array([0.3, -0.5, 0.8]) / np.linalg.norm([0.3, -0.5, 0.8])
     np.testing.assert_allclose(found.centroid, middle, atol=0.02)
+
+
+def test_the_line_bends_as_the_circle_does(operators):
+    """A window that is chosen by the curvature of its own parabola makes it a quarter larger."""
+    measures = core.SurfaceMeasures(operators("random sphere"))
+    bend = []
+    for axis in random_sphere(12, 1):
+        _, line = _find_line(measures, measures.laplacian.points @ axis > np.cos(np.radians(50.0)), lambda done: None)
+        bend.append(np.mean(line.bend) * np.tan(np.radians(50.0)))
+    assert np.mean(bend) == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_distances_from_a_circle_in_the_plane_are_exact(operators, side):
+    laplacian = operators("square grid")
+    points, spacing = laplacian.surface_points, core.SurfaceMeasures(laplacian).spacing.mean()
+    middle, radius, angle = points.mean(axis=0), 10.0 * spacing, np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)
+    outward = np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
+    same = np.ones(60)
+    up = same[:, None] * laplacian.normals[0]
+    component = np.zeros(60, dtype=np.int64)
+    line = _Line(middle + radius * outward, up, -side * outward, side / radius * same, spacing * same, component)
+    rows, distance, _ = line.distances(laplacian, np.arange(len(points)))
+    exact = side * (radius - np.linalg.norm(points[rows] - middle, axis=1))
+    np.testing.assert_allclose(distance, exact, atol=1e-12 * radius)
 
 
 def test_a_third_of_a_torus(operators):
