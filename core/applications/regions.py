@@ -31,18 +31,23 @@ _PRIOR = np.array([1e-3, 0.05, 1.0])  # how much the fit resists an offset, a sl
 _LARGEST = np.array([1.0, 1.0, 0.5])  # change of each in a step, and in all
 _ROUNDS = 8  # of Newton's iteration at most
 _DONE = 1e-3  # of the largest change: it ends with smaller ones
+_ROUND = 0.5  # of the distance from a line to the middle of its circle, within which that tells distances
+_ARCHED = 0.02  # of the length of a line, at most, by which curvature of the surface changes those beside it
 _WIDE = 4.0  # spacings on both sides of the line over which areas are summed to its length
 _NARROW = 3.0  # spacings from the boundary of the surface over which areas are summed to its length, and twice that
 _THIN = 0.7  # of the depth of a thin part that may be taken for that
 _DEEP = 8.0  # spacings from the line within which distances are measured, more than those over the last number
-_TURNS = 0.06, 0.09  # by which the line turns along a spacing, until plain sums are nearer to the area
+_TURNS = 0.1, 0.15  # by which the line turns along a spacing, until plain sums are nearer to the area
 _VARIANCE = 1.0 / 7.0  # of the derivative of the step
 _MOMENTS = 0.1  # share of an area that may be wrong where trust is a half
 _ROUGH = 0.04  # of the height of noise, over the spacing: what it adds to areas
 _ROUNDED = 6.0  # of noise times spacing times the squared mean curvature: what smoothing it takes from edges
 STRIP = 0.2  # of the spacing, along the boundary of the surface: where that is
 _AREA_OFF = 1.0  # of the area of a square of one spacing: what each such piece of the line leaves open, two deviations
-LENGTH_OFF = 0.01, 0.05  # of the length of the line, and of the boundary of the surface
+LENGTH_OFF = 0.005, 0.05  # of the length of the line, and of the boundary of the surface
+_LENGTH_BENT = 0.3  # of the length, times the squared curvature of the surface over a spacing: what is off more
+_LENGTH_DOUBTED = 0.2  # of the length where there is no trust, too
+_LENGTH_LOST = 0.4  # of the length of the line next to points where no parabola is found
 _UPPER = np.triu_indices(3)  # entries of a symmetric matrix that tell all
 _MIRRORED = np.array([0, 1, 2, 1, 3, 4, 2, 4, 5])  # where each entry is among these
 _NEAREST = 24  # pieces of the line by which the distance of a point is measured
@@ -238,7 +243,10 @@ def measure_region(
     slope, second = _slope(ratio) / width[near], _second(ratio) / width[near] ** 2
     step = np.where(inside > 0.0, 1.0, 0.0)
     step[near] = _step(ratio)
-    length, turns = float(areas[near] @ slope), float(areas[near] @ second)
+    # Lines beside a geodesic on a sphere are shorter than it, by half the squared distance.
+    arched = 0.5 * _VARIANCE * laplacian.gaussian_curvature[near] * width[near] ** 2
+    length = float(areas[near] @ (slope * (1.0 + np.clip(arched, -_ARCHED, _ARCHED))))
+    turns = float(areas[near] @ second)
     bent = float(areas[near] @ _second(ratio))
     plain, smooth = float(areas @ share), float(areas @ step - 0.5 * _VARIANCE * bent)
     # Where the line turns within a few spacings, the parabolas are off by more than the cells.
@@ -248,13 +256,17 @@ def measure_region(
     owned = whole.boundary_lengths * step
     own, doubt = float(owned.sum()), float(share @ whole.area_doubts + STRIP * abs(spacing @ owned))
     weight = areas * (fine * step + (1.0 - fine) * share)
-    squared = areas[near] @ (slope * spacing[near] ** 3)
+    squared = max(float(areas[near] @ (slope * spacing[near] ** 3)), float(np.sum(line.lost**4)) / (2.0 * _STRIP))
+    bend = np.minimum(np.linalg.norm(laplacian.shape_operator[near], axis=(1, 2)) * spacing[near], 1.0)
+    off = _LENGTH_BENT * bend**2 + _LENGTH_DOUBTED * (1.0 - laplacian.trust[near])
+    off += LENGTH_OFF[0] * (_WIDE * spacing / width).max() ** 2
+    lost = _LENGTH_LOST * float(line.lost.sum()) / (2.0 * _STRIP)
     return Region(
         area=area,
         boundary_length=length + own,
         centroid=weight @ laplacian.surface_points / max(weight.sum(), 1e-300),
         area_uncertainty=float(np.hypot(_AREA_OFF * np.sqrt(squared), doubt)),
-        length_uncertainty=float(np.dot(LENGTH_OFF, (length * (_WIDE * spacing / width).max() ** 1.5, own))),
+        length_uncertainty=float(areas[near] @ (slope * off)) + lost + LENGTH_OFF[1] * abs(own),
     )
 
 
@@ -349,6 +361,8 @@ class _Line(NamedTuple):
     spacing : ndarray, (m,)
         Of the points.
     component : ndarray, (m,) int
+    lost : ndarray, (r,)
+        Spacing of the points next to the line where no piece of it is found.
     """
 
     feet: Floats
@@ -357,6 +371,7 @@ class _Line(NamedTuple):
     bend: Floats
     spacing: Floats
     component: Ints
+    lost: Floats
 
     def distances(self, laplacian: LaplaceBeltrami, rows: Ints) -> tuple[Ints, Floats, Floats]:
         """Measure points near the line, those of some rows that are on its sheet.
@@ -380,15 +395,18 @@ class _Line(NamedTuple):
         along = np.einsum("nkc,nkc->nk", offset, np.cross(self.normals, self.inward)[near])
         length = np.sqrt(np.einsum("nkc,nkc->nk", offset, offset))
         stretch = length / np.maximum(np.hypot(across, along), 1e-300)
-        across, bend = stretch * across, self.bend[near]
-        # From the circle with the curvature of the line.
-        signed = (2.0 * across - bend * (across**2 + along**2)) / (1.0 + np.hypot(1.0 - bend * across, bend * along))
         facing = np.einsum("nkc,nc->nk", self.normals[near], laplacian.normals[rows]) > SMOOTH
         facing &= np.einsum("nkc,nc->nk", self.inward[near], self.inward[near[:, 0]]) > _PARALLEL
         facing &= (stretch < _STEEP) | (length < self.spacing[near])
         weight = np.where(facing, np.exp(-((along / self.spacing[near]) ** 2)), 0.0)
         total = weight.sum(axis=1)
         weight /= np.maximum(total, 1e-300)[:, None]
+        across = stretch * across
+        # From the circle that the line is nearby, a larger one where its middle is near.
+        bend = np.einsum("nk,nk->n", weight, self.bend[near])[:, None]
+        limit = _ROUND / np.maximum(np.abs(across), 1e-300)
+        bend = np.clip(bend, -limit, limit)
+        signed = (2.0 * across - bend * (across**2 + along**2)) / (1.0 + np.hypot(1.0 - bend * across, bend * along))
         mean = np.einsum("nk,nk->n", weight, signed), np.einsum("nk,nk->n", weight, self.spacing[near])
         known = (total > _LEAST) & (np.abs(mean[0]) < _DEEP * mean[1])
         return rows[known], mean[0][known], mean[1][known]
@@ -483,8 +501,8 @@ class _Strip:
         bend = -found[:, 2] / steep**3 / self._spacing
         sound = (np.abs(distance) < _STRIP) & (np.abs(found[:, 0] - self._start) < _LARGEST[0])
         sound &= (np.abs(found[:, 1:]) < _LARGEST[1:]).all(axis=1)
-        pieces = (feet, self._normals, inward, bend, self._spacing, self._component)
-        return _Line(*(piece[sound] for piece in pieces))
+        at = self._normals[sound], inward[sound], bend[sound], self._spacing[sound], self._component[sound]
+        return _Line(feet[sound], *at, self._spacing[~sound])
 
 
 class _Likelihood:
