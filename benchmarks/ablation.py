@@ -105,10 +105,10 @@ def constants():
 
 
 def change(value, factor):
-    """A constant larger or smaller; whole numbers by one at least."""
+    """A constant larger or smaller; whole numbers by one at least, shares halfway to one at most."""
     if isinstance(value, int):
         return max(round(value * factor), value + 1) if factor > 1.0 else min(round(value * factor), value - 1)
-    return value * factor
+    return value * factor if value * factor < 1.0 or value >= 1.0 else 0.5 * (1.0 + value)
 
 
 def jump(ratio, count=3000):
