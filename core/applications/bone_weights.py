@@ -13,8 +13,10 @@ from scipy.spatial import cKDTree
 from ..algebra import blocks, on_all_cores, solve_columns, sparsify
 from ..arguments import as_doubles, check_array, check_finite, check_switches, not_negative, positive, whole
 from ..errors import InvalidPointsError, PointCloudError
+from ..geometry import nearest_rows
 from ..operator import LaplaceBeltrami
 from ..types import Bools, Floats, Ints, Progress
+from .graph import followers
 from .inside import Inside
 
 _SAME = 1e-3  # of the distance to the nearest bone, within which others are as near
@@ -114,9 +116,8 @@ def bone_weights(
     heat = 2.0 * laplacian.areas[kept] * near.sum(axis=1) / (width * distance) ** 2
     result = np.empty((len(laplacian.points), len(heads)))
     result[kept] = _equilibrium(laplacian, kept, heat, near, report)
-    lone = np.flatnonzero(laplacian.component < 0)
-    if len(lone):
-        result[lone] = result[kept[cKDTree(laplacian.points[kept]).query(laplacian.points[lone])[1]]]
+    lone, leader = followers(laplacian.points, laplacian.component)
+    result[lone] = result[leader]
     return strongest(result, most, least)
 
 
@@ -142,11 +143,10 @@ def strongest(weights: Floats, most: int, least: float) -> Floats:
     """Return weights, (n, b), of which so many of each row, and none below the least, are left; rows sum to one."""
     result = np.maximum(weights, 0.0)
     if most < result.shape[1]:
-        limit = np.partition(result, -most, axis=1)[:, -most]
         order = np.argsort(-result, axis=1, kind="stable")
         rank = np.empty_like(order)
         np.put_along_axis(rank, order, np.arange(result.shape[1])[None], axis=1)
-        result[(result < limit[:, None]) | (rank >= most)] = 0.0
+        result[rank >= most] = 0.0
     result[(result < least) & (result < result.max(axis=1, keepdims=True))] = 0.0
     return result / result.sum(axis=1, keepdims=True)
 
@@ -247,7 +247,7 @@ def _equilibrium(
     result = np.empty(near.shape)
     result[rows] = solve_columns(matrix, load, _ACCURACY, lambda share: report("Weights", 0.3 + 0.7 * share))
     if len(cold):
-        result[cold] = result[rows[cKDTree(points[rows]).query(points[cold])[1]]]
+        result[cold] = result[rows[nearest_rows(points[rows], points[cold])]]
     return result
 
 

@@ -20,9 +20,9 @@ from .deformation import (
     HandleSolver,
     check_constraints,
     components_held,
-    followers,
     notices_of_components,
 )
+from .graph import followers
 
 _COUNT = 6000  # points to solve on
 _FEWEST = 300  # of a component, as far as it has them

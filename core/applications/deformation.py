@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
-from scipy.spatial import cKDTree
 
 from ..algebra import TRACE, Anderson, blocks, dissect, factorize, nearest_rotations, rotations_in_groups, sparsify
 from ..arguments import as_doubles, check_array, check_positions, check_switches, real, whole
@@ -16,7 +15,7 @@ from ..geometry import as_indices
 from ..operator import LaplaceBeltrami, narrow_laplacian
 from ..types import Floats, Ints, Progress
 from .gradients import DeformationGradients, coupled, step_products, sums_over_steps
-from .graph import coupled_components
+from .graph import coupled_components, followers
 
 NEIGHBORS = 60  # fewer make rotations converge slower, and factors hardly smaller once faint pairs are dropped
 STEPS = 30  # most rotation-aware steps of a solve; hard cases take 15
@@ -400,15 +399,6 @@ def _without_uncoupled(laplacian: LaplaceBeltrami, held_components: Ints, held: 
     fast = np.isin(label, label[held]) & (label >= 0) & coupled(laplacian)
     loose = np.isin(laplacian.component, held_components) & ~fast
     return np.where(loose, -1, laplacian.component)
-
-
-def followers(points: Floats, component: Ints, held: Ints) -> tuple[Ints, Ints]:
-    """Return the points on no surface and without a constraint, and for each the nearest point on a surface."""
-    alone = component < 0
-    lone, own = np.setdiff1d(np.flatnonzero(alone), held), np.flatnonzero(~alone)
-    if not len(lone) or not len(own):
-        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    return lone, own[cKDTree(points[own]).query(points[lone])[1]]
 
 
 def components_held(component: Ints, held: Ints) -> Ints:

@@ -7,7 +7,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..geometry import COUNT
+from ..geometry import COUNT, nearest_rows
 from ..operator import LaplaceBeltrami
 from ..types import Array, Bools, Floats, Ints
 
@@ -131,3 +131,12 @@ def mean_spacing(laplacian: LaplaceBeltrami) -> Floats:
     known = laplacian.component >= 0
     result: Floats = np.where(known, spacing, np.median(spacing[known]))
     return result
+
+
+def followers(points: Floats, component: Ints, held: Ints | tuple[()] = ()) -> tuple[Ints, Ints]:
+    """Return the points on no surface, but for those that are held, and for each the nearest point on a surface."""
+    alone = component < 0
+    lone, own = np.setdiff1d(np.flatnonzero(alone), held), np.flatnonzero(~alone)
+    if not len(lone) or not len(own):
+        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+    return lone, own[nearest_rows(points[own], points[lone])]

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
-from ..algebra import dissect, factorize
+from ..algebra import dissect, factorize, sparsify
 from ..arguments import as_doubles, check_array, check_finite, check_switches, not_negative
 from ..errors import InvalidPointsError, PointCloudError
-from ..geometry import as_indices, as_mask
-from ..operator import LaplaceBeltrami
-from ..types import Floats, Progress
+from ..geometry import Prolongation, as_indices, as_mask, blue_noise_subset, nearest_rows
+from ..operator import LaplaceBeltrami, narrow_laplacian
+from ..types import Floats, Ints, Progress
+from .graph import followers
 from .motion import Heat
-from .reduced import reduce
+
+_MOST = 10_000  # points, which are solved on within two seconds; of more, so many are
 
 
 def inpaint(
@@ -90,7 +94,7 @@ def inpaint(
     check_switches(biharmonic=biharmonic)
     if not (laplacian.component[known] >= 0).any():
         raise PointCloudError("No known point lies on the surface. Give values of at least one point that does.")
-    few = reduce(laplacian, lambda stage, fraction: report("Fill", 0.3 * fraction))
+    few = _solved(laplacian, lambda stage, fraction: report("Fill", 0.3 * fraction))
     columns = given.reshape(len(known), -1)
     every = np.full((count, columns.shape[1]), np.nan)
     every[known] = columns
@@ -109,11 +113,11 @@ def inpaint(
         rows = energy[free]
         solve = factorize(rows[:, free].tocsr(), starts, lambda share: report("Fill", 0.4 + 0.5 * share))
         # From the nearest known value on, so that a constant stays one to the last digit.
-        found[free] = _nearest(few.points[free], few.points[held], found[held])
+        found[free] = found[held][nearest_rows(few.points[held], few.points[free])]
         found[free] -= solve(np.asarray(rows @ np.nan_to_num(found)))
     cold = np.flatnonzero(~led)
     if len(cold):
-        found[cold] = _nearest(few.points[cold], laplacian.points[known], columns)
+        found[cold] = columns[nearest_rows(laplacian.points[known], few.points[cold])]
     result = few.carry(found)
     result[known] = columns
     return result.reshape(count, *given.shape[1:])
@@ -198,12 +202,59 @@ def smooth_weights(
     if not held.any():
         return result
     # The others share what the locked ones leave.
-    result = np.where(held, given, result)
-    kept, moving = result[:, held].sum(axis=1), result[:, ~held].sum(axis=1)
+    kept, moving = given[:, held].sum(axis=1), result[:, ~held].sum(axis=1)
     scale = np.maximum(total - kept, 0.0) / np.where(moving > 0.0, moving, 1.0)
     return np.where(held, given, result * scale[:, None])
 
 
-def _nearest(places: Floats, points: Floats, values: Floats) -> Floats:
-    """Return the values of the points that are nearest to some places, (k, m)."""
-    return values[cKDTree(points).query(places)[1]]
+@dataclass(frozen=True)
+class _Solved:
+    """Some of the points of a surface, with an operator of their own whose factors are small.
+
+    Attributes
+    ----------
+    rows : ndarray, (m,) int
+        Which points.
+    points : ndarray, (m, 3)
+        On the surface [L].
+    stiffness : csr_array, (m, m)
+    areas : ndarray, (m,)
+    carry : callable
+        From values (m, k) to those of all points, (n, k); points that are left out have those of the nearest one.
+    """
+
+    rows: Ints
+    points: Floats
+    stiffness: sparse.csr_array
+    areas: Floats
+    carry: Callable[[Floats], Floats]
+
+
+def _solved(laplacian: LaplaceBeltrami, report: Progress) -> _Solved:
+    """Choose the points to solve on: all, or some of many, from which values are carried to all."""
+    kept = np.flatnonzero(laplacian.component >= 0)
+    points = laplacian.surface_points[kept]
+    lone, leader = followers(laplacian.points, laplacian.component)
+
+    def complete(values: Floats) -> Floats:
+        result = np.empty((len(laplacian.points), *values.shape[1:]))
+        result[kept] = values
+        result[lone] = result[leader]
+        return result
+
+    if len(kept) <= _MOST:
+        stiffness = sparsify(laplacian.stiffness[kept][:, kept])
+        return _Solved(kept, points, stiffness, laplacian.areas[kept], complete)
+    report("Points", 0.0)
+    some = kept[blue_noise_subset(points, _MOST)]
+    few = narrow_laplacian(laplacian, rows=some, progress=lambda stage, share: report("Points", share))
+    on = few.component >= 0
+    rows, surface = some[on], few.surface_points[on]
+    every = Prolongation(points, np.searchsorted(kept, rows), few.normals[on], laplacian.component[rows])
+
+    def carry(values: Floats) -> Floats:
+        """Interpolate without leaving the range of the values."""
+        low, high = values.min(axis=0), values.max(axis=0)
+        return complete(np.clip(every.interpolate(values), low, high))
+
+    return _Solved(rows, surface, few.stiffness[on][:, on], few.areas[on], carry)

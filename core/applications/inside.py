@@ -45,7 +45,10 @@ class Inside:
         report()
         flux = _spread((points - self._low) / self.cell, areas[:, None] * normals / self.cell**2, shape)
         waves = np.meshgrid(
-            *(2.0 * np.pi * fft.fftfreq(size) for size in shape[:2]), _half(shape[2]), indexing="ij", sparse=True
+            *(2.0 * np.pi * fft.fftfreq(size) for size in shape[:2]),
+            2.0 * np.pi * fft.rfftfreq(shape[2]),
+            indexing="ij",
+            sparse=True,
         )
         total, squared = np.zeros((), dtype=complex), np.zeros(())
         for part, wave in zip(flux, waves, strict=True):
@@ -55,12 +58,12 @@ class Inside:
         squared[0, 0, 0] = 1.0
         field = fft.irfftn(total / squared, s=shape, workers=-1)
         border = np.concatenate([np.take(field, 0, axis=axis).ravel() for axis in range(3)])
-        self.winding = (field - border.mean()).astype(np.float32)
+        self._winding = (field - border.mean()).astype(np.float32)
 
     def at(self, places: Floats) -> Floats:
         """Return the winding number at places [L], (..., 3); zero beyond the grid."""
         index = np.moveaxis((places - self._low) / self.cell, -1, 0)
-        return map_coordinates(self.winding, index, order=1, mode="constant", output=np.float32)
+        return map_coordinates(self._winding, index, order=1, mode="constant", output=np.float32)
 
     def sees(self, starts: Floats, ends: Floats) -> Bools:
         """Return which straight ways do not leave the body, (k,) bool.
@@ -88,10 +91,6 @@ def _edge(extent: Floats) -> float:
     for _ in range(30):
         edge = float(np.cbrt(np.prod(size + (2 * _MARGIN + 1) * edge) / _CELLS))
     return edge
-
-
-def _half(size: int) -> Floats:
-    return 2.0 * np.pi * fft.rfftfreq(size)
 
 
 def _spread(index: Floats, values: Floats, shape: list[int]) -> Floats:

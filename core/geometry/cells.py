@@ -146,9 +146,8 @@ def _cuts(
     if sides is not None:
         sure = np.maximum(sides.sharp[rows, None], sides.sharp[index])
         edged = np.nonzero(sure)
-        side = np.where(cosine[edged] < 0.0, -1.0, 1.0)[:, None, None]
-        form = sides.shape_operator[rows[edged[0]]] + side * sides.shape_operator[index[edged]]
-        turn = 0.5 * np.einsum("pa,pab,pb->p", chord[edged], form, chord[edged])
+        side = np.where(cosine[edged] < 0.0, -1.0, 1.0)
+        turn = sides.turn(rows[edged[0]], index[edged], chord[edged], side)
         heights = left[edged], right[edged]
         squared[edged] = bent_squared(distance[edged] ** 2, *heights, np.abs(cosine[edged]), turn, sure[edged])
     # The direction of the arc at the point, from its chord and a third of the angle between the normals.

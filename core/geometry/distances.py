@@ -82,7 +82,7 @@ def arc_length(cloud: Cloud) -> Floats:
     pairs, steep = cloud.pairs, cloud.squared_slope.any()
     result = np.empty(len(pairs.first))
     points, normals = pairs.points.T.copy(), cloud.sides.normals.T.copy()
-    forms, sharp = cloud.sides.shape_operator, cloud.sides.sharp
+    sharp = cloud.sides.sharp
 
     def measure(patch: Patch) -> None:
         chord, left, right, cosine = pair_heights(patch.first, patch.second, points, normals)
@@ -94,8 +94,7 @@ def arc_length(cloud: Cloud) -> Floats:
         edged = np.flatnonzero(sure)
         if len(edged):
             first, second = (ends[patch.pairs][edged] for ends in (pairs.first, pairs.second))
-            form = forms[first] + side[edged, None, None] * forms[second]
-            turn = 0.5 * np.einsum("ap,pab,bp->p", chord[:, edged], form, chord[:, edged])
+            turn = cloud.sides.turn(first, second, chord[:, edged].T, side[edged])
             arc[edged] = bent_squared(squared[edged], left[edged], right[edged], cosine[edged], turn, sure[edged])
         if steep:
             arc += patch.mean(cloud.squared_slope) * np.maximum(squared - patch.mean(cloud.spacing) ** 2, 0.0)

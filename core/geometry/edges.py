@@ -36,6 +36,15 @@ class Sides:
     shape_operator: Floats
     sharp: Floats
 
+    def turn(self, first: Ints, second: Ints, chord: Floats, side: Floats) -> Floats:
+        """Return by how much normals differ along chords, (k, 3), by the bends at both ends: what is no edge.
+
+        `side` is -1 where the normals of both ends point to different sides of the surface, else 1.
+        """
+        form = self.shape_operator[first] + side[:, None, None] * self.shape_operator[second]
+        result: Floats = 0.5 * np.einsum("pa,pab,pb->p", chord, form, chord)
+        return result
+
     def toward(self, normals: Floats) -> Sides:
         """Return the same, seen from where normals of the surface, (m, 3), point."""
         side = np.where(np.einsum("ij,ij->i", normals, self.normals) < 0.0, -1.0, 1.0)

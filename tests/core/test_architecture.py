@@ -120,14 +120,16 @@ BELOW = {  # what each wing of core may use
     "splats": GROUND | {"algebra", "files"},
 }
 SIDEWAYS = {  # applications that build on others
+    ("bone_weights", "graph"),
     ("bone_weights", "inside"),
+    ("coarse_deformation", "graph"),
     ("coarse_deformation", "deformation"),
     ("deformation", "gradients"),
     ("deformation", "graph"),
     ("fields", "graph"),
     ("geodesics", "graph"),
     ("inpainting", "motion"),
-    ("inpainting", "reduced"),
+    ("inpainting", "graph"),
     ("meshing", "sides"),
     ("motion", "propagation"),
     ("reaction", "propagation"),
