@@ -29,6 +29,7 @@ class Tool:
     adjustable = ()  # names of those in Adjust Last Operation, which blocks: they repeat no long computation
     at_zero = {}  # texts beside settings of 0, by name, where 0 means automatic or unlimited
     writes = ()  # names of the attributes that `write` makes
+    changes = True  # whether anything is written to the objects; else they may share their meshes with others
 
     @property
     def shown(self) -> str:
@@ -40,7 +41,8 @@ class Tool:
         plans = []
         for obj in objects:
             with naming(obj.name):
-                check_writable(obj, self.writes, self.becomes_single(obj), among)
+                if self.changes:
+                    check_writable(obj, self.writes, self.becomes_single(obj), among)
                 plans.append((obj.name, self.plan(context, obj)))
         return plans
 
@@ -53,7 +55,7 @@ class Tool:
 
     def becomes_single(self, obj) -> bool:
         """Whether an object that shares its mesh gets its own."""
-        return obj.meshfree.make_single_user
+        return self.changes and obj.meshfree.make_single_user
 
     def is_repeated(self, context) -> bool:
         """Whether Adjust Last Operation runs this again."""

@@ -14,7 +14,7 @@ from ..objects.curves import plot
 from ..objects.place import place_of
 from ..objects.result import length_text
 from ..registration import Registration, Row
-from ..running.application import Tool, naming, operator_reader
+from ..running.application import Tool, operator_reader
 from ..running.stages import Stages
 from .measuring import path_between, selected_ends
 from .select import SelectionOperator
@@ -25,6 +25,7 @@ _AXES = "XYZ"
 class Profile(Tool):
     """The settings and the work of `meshfree.profile`."""
 
+    changes = False
     asks = ("source", "axis")
     table = ""  # what was measured, as text with commas
 
@@ -37,14 +38,6 @@ class Profile(Tool):
         items=[(axis, axis, f"Along the {axis} axis of the world") for axis in _AXES],
         default="Z",
     )
-
-    def plan_all(self, context, objects, among=()):
-        """Return name and plan of each object: nothing is written to them."""
-        plans = []
-        for obj in objects:
-            with naming(obj.name):
-                plans.append((obj.name, self.plan(context, obj)))
-        return plans
 
     def ends(self, obj):
         """Return the two points between which the path leads, (2,) int."""

@@ -10,7 +10,7 @@ from ..objects.curves import add_curves
 from ..objects.planes import plane_of
 from ..objects.result import area_text, length_text
 from ..registration import Registration, Row
-from ..running.application import ApplicationOperator, Tool, naming, operator_reader
+from ..running.application import ApplicationOperator, Tool, operator_reader
 from .mesh import bare_mesh
 
 _UP = np.array([0.0, 0.0, 1.0])
@@ -19,6 +19,7 @@ _UP = np.array([0.0, 0.0, 1.0])
 class CrossSection(Tool):
     """The settings and the work of `meshfree.cross_section`."""
 
+    changes = False
     asks = adjustable = ("plane", "thickness")
     found = None  # what was measured
 
@@ -34,17 +35,6 @@ class CrossSection(Tool):
         min=0.0,
         subtype="DISTANCE",
     )
-
-    def plan_all(self, context, objects, among=()):
-        """Return name and plan of each object: nothing is written to them, so that others may share their meshes."""
-        plans = []
-        for obj in objects:
-            with naming(obj.name):
-                plans.append((obj.name, self.plan(context, obj)))
-        return plans
-
-    def becomes_single(self, obj):
-        return False  # its mesh is not changed
 
     def plan(self, context, obj):
         reading, operator = operator_reader(context, obj)

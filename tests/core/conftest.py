@@ -55,3 +55,10 @@ def eigenvalues(operators):
         return operators(name, factor).eigenpairs(count).eigenvalues
 
     return solve
+
+
+@pytest.fixture
+def bar(operators):
+    """A capsule along an axis, with its operator."""
+    laplacian = operators("capsule")
+    return laplacian.points, laplacian

@@ -5,6 +5,7 @@ import pytest
 
 import core
 from benchmarks.samplings import fibonacci_sphere, random_sphere
+from tests.core.rods import axis_of
 
 GIVEN = np.random.default_rng(4)
 
@@ -15,20 +16,6 @@ def turned(axis, angle, shift=(0.0, 0.0, 0.0), about=(0.0, 0.0, 0.0)):
     cross = np.cross(np.eye(3), axis)
     rotation = np.eye(3) + np.sin(angle) * cross.T @ np.eye(3) * -1.0 + (1 - np.cos(angle)) * cross @ cross
     return np.column_stack([rotation, np.asarray(shift) + about - rotation @ about])
-
-
-@pytest.fixture
-def bar(operators):
-    """A capsule along an axis, with its operator."""
-    laplacian = operators("capsule")
-    return laplacian.points, laplacian
-
-
-def axis_of(points):
-    """The longest axis of points, their middle, and half of their length along it."""
-    middle = points.mean(axis=0)
-    axis = np.linalg.svd(points - middle, full_matrices=False)[2][0]
-    return middle, axis, np.ptp(points @ axis) / 2
 
 
 def two_bones(points):

@@ -5,22 +5,9 @@ import pytest
 
 import core
 from benchmarks.samplings import fibonacci_sphere
+from tests.core.rods import axis_of
 
 GIVEN = np.random.default_rng(4)
-
-
-@pytest.fixture
-def bar(operators):
-    """A capsule along an axis, with its operator."""
-    laplacian = operators("capsule")
-    return laplacian.points, laplacian
-
-
-def axis_of(points):
-    """The longest axis of points, their middle, and half of their length along it."""
-    middle = points.mean(axis=0)
-    axis = np.linalg.svd(points - middle, full_matrices=False)[2][0]
-    return middle, axis, np.ptp(points @ axis) / 2
 
 
 class TestInpaint:
