@@ -262,7 +262,7 @@ def measure_region(
     off += LENGTH_OFF[0] * (_WIDE * spacing / width).max() ** 2
     lost = _LENGTH_LOST * float(line.lost.sum()) / (2.0 * _STRIP)
     return Region(
-        area=area,
+        area=float(area),
         boundary_length=length + own,
         centroid=weight @ laplacian.surface_points / max(weight.sum(), 1e-300),
         area_uncertainty=float(np.hypot(_AREA_OFF * np.sqrt(squared), doubt)),
