@@ -119,54 +119,42 @@ BELOW = {  # what each wing of core may use
     "files": GROUND,
     "splats": GROUND | {"algebra", "files"},
 }
-SIDEWAYS = {  # applications that build on others
-    ("bone_weights", "graph"),
-    ("bone_weights", "inside"),
-    ("coarse_deformation", "graph"),
-    ("coarse_deformation", "deformation"),
-    ("deformation", "gradients"),
-    ("deformation", "graph"),
+SIDEWAYS = {  # packages and modules of applications that build on others
+    ("deforming", "graph"),
+    ("distance", "graph"),
     ("fields", "graph"),
-    ("geodesics", "graph"),
-    ("inpainting", "motion"),
-    ("inpainting", "graph"),
-    ("meshing", "sides"),
-    ("motion", "propagation"),
-    ("reaction", "propagation"),
-    ("transport", "geodesics"),
-    ("minimal_surface", "boundary_curve"),
-    ("paths", "geodesics"),
-    ("parts", "regions"),
-    ("piles", "regions"),
-    ("piles", "volume"),
-    ("regions", "graph"),
-    ("sections", "iso_lines"),
-    ("sections", "meshing"),
-    ("sections", "paths"),
-    ("segmentation", "graph"),
-    ("selection", "geodesics"),
-    ("selection", "graph"),
-    ("slopes", "gradients"),
-    ("smoothing", "filters"),
-    ("smoothing", "sizes"),
-    ("volume", "meshing"),
+    ("measuring", "deforming"),
+    ("measuring", "distance"),
+    ("measuring", "graph"),
+    ("measuring", "surfaces"),
+    ("rigging", "graph"),
+    ("rigging", "motion"),
+    ("spectral", "graph"),
 }
 
 
 def modules_of(wing):
-    return sorted(path for path in (ROOT / "core" / wing).glob("*.py") if path.name != "__init__.py")
+    return sorted(path for path in (ROOT / "core" / wing).rglob("*.py") if path.name != "__init__.py")
+
+
+def depth(path):
+    """Return how many dots lead from a module of core to core."""
+    return len(path.relative_to(ROOT / "core").parts)
 
 
 @pytest.mark.parametrize("wing", BELOW)
 def test_wings_of_core_use_what_is_below_them_by_its_face(wing):
     """``..geometry`` gives what `core/geometry/__init__.py` lists; its modules are its own."""
     assert len(modules_of(wing)) > 2
-    names = [(path, name[2:]) for path in modules_of(wing) for name in imported(path) if name.startswith("..")]
-    wrong = [
-        f"{path.name}: {name}"
-        for path, name in names
-        if name.split(".")[0] not in BELOW[wing] or (name.split(".")[0] in BELOW and name.count(".") != 1)
-    ]
+    wrong = []
+    for path in modules_of(wing):
+        up = "." * depth(path)
+        names = [name.removeprefix(up) for name in imported(path) if name.startswith(up)]
+        wrong += [
+            f"{path.name}: {name}"
+            for name in names
+            if name.split(".")[0] not in BELOW[wing] or (name.split(".")[0] in BELOW and name.count(".") != 1)
+        ]
     assert wrong == []
 
 
@@ -176,13 +164,16 @@ def test_the_ground_uses_nothing_above():
 
 
 def test_applications_use_each_other_only_where_they_build_on_them():
-    found = {
-        (path.stem, name.split(".")[1])
-        for path in modules_of("applications")
-        for name in imported(path)
-        if name.startswith(".") and not name.startswith("..")
-    }
-    assert found == SIDEWAYS
+    found = set()
+    for path in modules_of("applications"):
+        up = "." * (depth(path) - 1)
+        own = path.relative_to(ROOT / "core" / "applications").parts[0].removesuffix(".py")
+        found |= {
+            (own, name.removeprefix(up).split(".")[0])
+            for name in imported(path)
+            if re.match(rf"{re.escape(up)}\w", name)
+        }
+    assert {pair for pair in found if pair[0] != pair[1]} == SIDEWAYS
 
 
 def test_a_wing_lists_only_what_others_use():

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 import core
 from benchmarks.awkward import box
 from benchmarks.samplings import fibonacci_sphere, random_sphere, square_random
-from core.applications.sides import agreeing
+from core.applications.surfaces.sides import agreeing
 
 
 def edges_of(mesh):

@@ -1,0 +1,1 @@
+"""Fewer, smoother and better points."""

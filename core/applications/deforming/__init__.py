@@ -1,0 +1,1 @@
+"""Surfaces that bend by handles, and that shrink to the least area."""

@@ -1,0 +1,1 @@
+"""Distances, paths and directions along a surface."""

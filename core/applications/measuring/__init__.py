@@ -1,0 +1,1 @@
+"""Areas, lengths, volumes, sections and slopes of a surface."""

@@ -1,0 +1,1 @@
+"""Heat, waves, reactions and fronts that travel along a surface."""

@@ -1,0 +1,1 @@
+"""Weights of bones, their transfer, and surfaces that follow bones."""

@@ -1,0 +1,260 @@
+"""How much each point follows each bone of an armature: heat that bones give off and the surface spreads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from ...algebra import blocks, on_all_cores, solve_columns, sparsify
+from ...arguments import as_doubles, check_array, check_finite, check_switches, not_negative, positive, whole
+from ...errors import InvalidPointsError, PointCloudError
+from ...geometry import nearest_rows
+from ...operator import LaplaceBeltrami
+from ...types import Bools, Floats, Ints, Progress
+from ..graph import followers
+from .inside import Inside
+
+_SAME = 1e-3  # of the distance to the nearest bone, within which others are as near
+_ACCURACY = 2e-4  # of the equations: weights are right to 1e-4
+_BLOCK = 1 << 12
+_SAMPLES = 64  # places along a bone that are inside or not
+_INSIDE = 0.5  # winding number from which a place is inside
+_BESIDE = 5e-4  # keeps bones in front of a point at a finite distance
+_FLOOR = 1e-3  # of the spacing: a bone may pass through a point
+
+
+def bone_weights(
+    laplacian: LaplaceBeltrami,
+    heads: ArrayLike,
+    tails: ArrayLike,
+    *,
+    falloff: float = 1.0,
+    visible: bool = True,
+    influences: int | None = None,
+    least: float = 0.0,
+    progress: Progress | None = None,
+) -> Floats:
+    """Find how much each point of a surface follows each bone.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+        Of n points.
+    heads, tails : array_like, (b, 3)
+        Ends of the bones [L], in the space of the points.
+    falloff : float
+        Width of the blend between two bones, in distances to the nearest bone; above zero.
+    visible : bool
+        A bone warms only points that it reaches without leaving the body, and only its part within the body counts.
+    influences : int, optional
+        Most bones that a point follows; all by default.
+    least : float
+        Smaller weights become zero, from 0 to below 1; the largest of a point stays.
+    progress : callable, optional
+        Called as ``progress(stage, fraction)``; may raise `Cancelled`.
+
+    Returns
+    -------
+    ndarray, (n, b)
+        Weights from 0 to 1; rows sum to one. Points that the operator leaves out have those of the nearest one.
+
+    Raises
+    ------
+    InvalidPointsError
+        Ends of another shape, not finite, or none.
+    PointCloudError
+        A falloff that is not above zero, influences below one, or a least weight of 1 and more.
+
+    See Also
+    --------
+    skin : Moves the points with the bones.
+    smooth_weights, inpaint : Change weights that are there.
+
+    Notes
+    -----
+    Heat on the surface in equilibrium: ``Delta w + 2 (p - w) / (falloff d)^2 = 0`` with the distance d to the nearest
+    bone that a point sees, and p one for that bone, shared where several are as near, and zero for the others. Points
+    that see no bone take what flows from around. The matrix has nothing positive off its diagonal, so that weights lie
+    between 0 and 1 and sum to one by themselves. What lies inside is told by winding numbers of areas and normals, so
+    that it needs no faces. On a component of which no point sees a bone, that is not asked for.
+
+    References
+    ----------
+    Baran, Popovic. Automatic rigging and animation of 3D characters. ACM Trans. Graph. 26, 2007.
+
+    Examples
+    --------
+    Two bones along the axis of the unit ball share its points by halves:
+
+    >>> import numpy as np
+    >>> import core
+    >>> points = core.example_sphere()
+    >>> laplacian = core.build_laplacian(points)
+    >>> weights = core.bone_weights(laplacian, [[0, 0, -0.8], [0, 0, 0]], [[0, 0, 0], [0, 0, 0.8]])
+    >>> print(weights[[0, 400, 799], 1].round(1), np.allclose(weights.sum(axis=1), 1))
+    [1.  0.5 0. ] True
+    """
+    report = progress or (lambda stage, fraction: None)
+    heads, tails = check_bones(heads, tails)
+    width = positive(falloff, "falloff")
+    check_switches(visible=visible)
+    most = len(heads) if influences is None else whole(influences)
+    least = not_negative(least, "least weight")
+    if not most >= 1 or least >= 1.0:
+        raise PointCloudError(
+            f"Points follow {influences} bones with weights from {least} on. Use at least one, and less than 1."
+        )
+    most = int(min(most, len(heads)))
+    report("Bones", 0.0)
+    kept = np.flatnonzero(laplacian.component >= 0)
+    distance, near = _seen_bones(laplacian, kept, heads, tails, visible, report)
+    heat = 2.0 * laplacian.areas[kept] * near.sum(axis=1) / (width * distance) ** 2
+    result = np.empty((len(laplacian.points), len(heads)))
+    result[kept] = _equilibrium(laplacian, kept, heat, near, report)
+    lone, leader = followers(laplacian.points, laplacian.component)
+    result[lone] = result[leader]
+    return strongest(result, most, least)
+
+
+def check_bones(heads: ArrayLike, tails: ArrayLike) -> tuple[Floats, Floats]:
+    """Return the ends of bones, (b, 3) each.
+
+    Raises
+    ------
+    InvalidPointsError
+        Another shape, different numbers, none, or not finite.
+    """
+    advice = "Give x, y, z of one head and one tail for each bone."
+    first = as_doubles(check_array(heads, "Heads", [(None, 3)], advice))
+    second = as_doubles(check_array(tails, "Tails", [(len(first), 3)], advice))
+    if not len(first):
+        raise InvalidPointsError("There are no bones. Give the head and tail of at least one.")
+    for ends, name in ((first, "heads"), (second, "tails")):
+        check_finite(ends, name, advice)
+    return first, second
+
+
+def strongest(weights: Floats, most: int, least: float) -> Floats:
+    """Return weights, (n, b), of which so many of each row, and none below the least, are left; rows sum to one."""
+    result = np.maximum(weights, 0.0)
+    if most < result.shape[1]:
+        order = np.argsort(-result, axis=1, kind="stable")
+        rank = np.empty_like(order)
+        np.put_along_axis(rank, order, np.arange(result.shape[1])[None], axis=1)
+        result[rank >= most] = 0.0
+    result[(result < least) & (result < result.max(axis=1, keepdims=True))] = 0.0
+    return result / result.sum(axis=1, keepdims=True)
+
+
+def _seen_bones(
+    laplacian: LaplaceBeltrami, kept: Ints, heads: Floats, tails: Floats, visible: bool, report: Progress
+) -> tuple[Floats, sparse.csr_array]:
+    """Return how far the nearest bone is that each kept point sees, (m,), and shares of those as near, (m, b).
+
+    Rows of shares sum to one; those of points that see no bone are empty. Where no point does, none needs to.
+    """
+    points, normals = laplacian.surface_points[kept], laplacian.normals[kept]
+    floor = _FLOOR * np.sqrt(np.median(laplacian.areas[kept]))
+    if visible:
+        inside = Inside(laplacian, lambda: report("Bones", 0.05))
+        starts = points - inside.cell * normals
+        ends = _parts_inside(heads, tails, inside)
+        found = _nearest_bones(points, normals, ends, floor, lambda rows, ends: inside.sees(starts[rows], ends), report)
+        if found[1].nnz:
+            return found
+    return _nearest_bones(
+        points, None, (heads, tails), floor, lambda rows, ends: np.ones(len(rows), dtype=bool), report
+    )
+
+
+def _parts_inside(heads: Floats, tails: Floats, inside: Inside) -> tuple[Floats, Floats]:
+    """Return bones cut off where they leave the body at their ends; those that are all outside stay."""
+    share = np.linspace(0.0, 1.0, _SAMPLES)
+    within = inside.at(heads[:, None] + share[:, None] * (tails - heads)[:, None]) > _INSIDE
+    within[~within.any(axis=1)] = True
+    first, last = share[within.argmax(axis=1)], share[::-1][within[:, ::-1].argmax(axis=1)]
+    return heads + first[:, None] * (tails - heads), heads + last[:, None] * (tails - heads)
+
+
+def _nearest_bones(
+    points: Floats,
+    normals: Floats | None,
+    bones: tuple[Floats, Floats],
+    floor: float,
+    sees: Callable[[Ints, Floats], Bools],
+    report: Progress,
+) -> tuple[Floats, sparse.csr_array]:
+    """Return the distance of points to the nearest bone seen, (m,), at least the floor, and shares, (m, b).
+
+    With normals a bone straight below a point is the nearest, and counts farther the more it lies beside it.
+    """
+    distance = np.ones(len(points))
+
+    def find(block: slice) -> tuple[Ints, Ints]:
+        near = _nearest_places(points[block], *bones)
+        away = points[block, None] - near
+        gap = np.maximum(np.linalg.norm(away, axis=2), floor)
+        if normals is not None:
+            gap /= 0.5 + _BESIDE + 0.5 * np.einsum("ibc,ic->ib", away, normals[block]) / gap
+        order = np.argsort(gap, axis=1, kind="stable")
+        seen = np.zeros(gap.shape, dtype=bool)
+        open_ = np.arange(len(gap))
+        for bone in order.T:
+            of = bone[open_]
+            clear = sees(block.start + open_, near[open_, of])
+            done, first = open_[clear], of[clear]
+            distance[block.start + done] = gap[done, first]
+            # Bones that meet in a joint are as near.
+            seen[done] = np.abs(gap[done] - gap[done, first][:, None]) <= _SAME * gap[done, first][:, None]
+            open_ = open_[~clear]
+            if not len(open_):
+                break
+        row, column = np.nonzero(seen)
+        return block.start + row, column
+
+    found = on_all_cores(find, blocks(len(points), _BLOCK), lambda: report("Bones", 0.1))
+    row, column = (np.concatenate(part) for part in zip(*found, strict=True))
+    count = np.bincount(row, minlength=len(points))
+    near = sparse.csr_array((1.0 / count[row], (row, column)), shape=(len(points), len(bones[0])))
+    return distance, near
+
+
+def _nearest_places(points: Floats, first: Floats, last: Floats) -> Floats:
+    """Return the place on each bone that is nearest to each point, (m, b, 3)."""
+    along = last - first
+    squared = np.maximum(np.einsum("bc,bc->b", along, along), np.finfo(float).tiny)
+    share = (points @ along.T - np.einsum("bc,bc->b", first, along)) / squared
+    return first + np.clip(share, 0.0, 1.0)[:, :, None] * along
+
+
+def _equilibrium(
+    laplacian: LaplaceBeltrami, kept: Ints, heat: Floats, near: sparse.csr_array, report: Progress
+) -> Floats:
+    """Return the weights of points in equilibrium, (m, b); components without heat have those of the nearest other."""
+    points = laplacian.surface_points[kept]
+    stiffness = _apart(sparsify(laplacian.stiffness[kept][:, kept]), laplacian.normals[kept])
+    component = connected_components(stiffness, directed=False)[1]
+    warm = np.bincount(component, heat)[component] > 0.0
+    rows, cold = np.flatnonzero(warm), np.flatnonzero(~warm)
+    rows = rows[cKDTree(points[rows]).indices]  # neighbours near in memory make the products faster
+    matrix = (stiffness[rows][:, rows] + sparse.diags_array(heat[rows])).tocsr()
+    load = (sparse.diags_array(heat[rows]) @ near[rows]).toarray()
+    result = np.empty(near.shape)
+    result[rows] = solve_columns(matrix, load, _ACCURACY, lambda share: report("Weights", 0.3 + 0.7 * share))
+    if len(cold):
+        result[cold] = result[rows[nearest_rows(points[rows], points[cold])]]
+    return result
+
+
+def _apart(stiffness: sparse.csr_array, normals: Floats) -> sparse.csr_array:
+    """Leave out pairs whose normals differ by more than a right angle: sheets that touch, as a hand and a hip."""
+    pairs = stiffness.tocoo()
+    first, second = pairs.coords
+    same = (np.einsum("ij,ij->i", normals[first], normals[second]) > 0.0) & (first != second)
+    weights = sparse.csr_array((-pairs.data[same], (first[same], second[same])), shape=stiffness.shape)
+    return (sparse.diags_array(weights.sum(axis=1), format="csr") - weights).tocsr()
