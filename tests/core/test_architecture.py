@@ -168,11 +168,8 @@ def test_applications_use_each_other_only_where_they_build_on_them():
     for path in modules_of("applications"):
         up = "." * (depth(path) - 1)
         own = path.relative_to(ROOT / "core" / "applications").parts[0].removesuffix(".py")
-        found |= {
-            (own, name.removeprefix(up).split(".")[0])
-            for name in imported(path)
-            if re.match(rf"{re.escape(up)}\w", name)
-        }
+        beside = [name.removeprefix(up) for name in imported(path) if re.match(rf"{re.escape(up)}\w", name)]
+        found |= {(own, name.split(".")[0]) for name in beside}
     assert {pair for pair in found if pair[0] != pair[1]} == SIDEWAYS
 
 
