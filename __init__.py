@@ -12,7 +12,7 @@ def _modules():
 
     if not missing.scipy_serves():
         return (missing,)
-    from .operators import tools
+    from .operators import rigging, tools
     from .operators.deform import bake, live
     from .operators.deform import tools as deform
     from .operators.files import command, exporting, importing
@@ -49,6 +49,7 @@ def _modules():
         deform,
         bake,
         live,
+        *_within(rigging),
         importing,
         exporting,
         command,

@@ -1,0 +1,1 @@
+"""Armatures: weights of bones, and point clouds that follow them."""

@@ -1,0 +1,97 @@
+"""Weights of bones: vertex groups of meshes; a table of the four largest of each point of a point cloud.
+
+The table is two attributes, the numbers of the bones and their weights. The names of the bones, in the order of the
+numbers, are a custom property of the data.
+"""
+
+import numpy as np
+from scipy import sparse
+
+from ...core import PointCloudError
+from ..objects.attributes import point_count, read_attribute, remove_attributes, tag_changed, write_attribute
+from ..objects.groups import add_group
+
+BONES, WEIGHTS = "lb_bones", "lb_bone_weights"  # attributes of point clouds, four numbers each
+NAMES = "lb_bone_names"  # custom property of their data
+MOST = 4  # bones that a point of a point cloud follows at most
+_LEAST = 1e-6  # weight from which a point is in a group
+
+
+def has_weights(obj) -> bool:
+    """Whether an object has weights of any bones, or vertex groups."""
+    if obj.type == "MESH":
+        return bool(obj.vertex_groups)
+    return NAMES in obj.data and BONES in obj.data.attributes and WEIGHTS in obj.data.attributes
+
+
+def weight_names(obj) -> list:
+    """Return the names of the bones that an object has weights of, or of its vertex groups, in their order."""
+    if obj.type == "MESH":
+        return [group.name for group in obj.vertex_groups]
+    return list(obj.data.get(NAMES, ()))
+
+
+def read_weights(obj):
+    """Return the weights of all points, a sparse array (n, b) of float64, in the order of `weight_names`.
+
+    Raises
+    ------
+    PointCloudError
+        A point cloud without weights, or with numbers of bones that there are not.
+    """
+    count, width = point_count(obj.data), len(weight_names(obj))
+    if obj.type == "MESH":
+        held = [(item.group, item.weight) for vertex in obj.data.vertices for item in vertex.groups]
+        sizes = np.fromiter((len(vertex.groups) for vertex in obj.data.vertices), np.int64, count=count)
+        columns, values = (np.array(part) for part in zip(*held, strict=True)) if held else (np.empty(0, int), [])
+        rows = np.repeat(np.arange(count), sizes)
+    else:
+        if not has_weights(obj):
+            raise PointCloudError(f'"{obj.name}" has no weights of bones. Run Automatic Weights first.')
+        numbers, shares = (read_attribute(obj.data, name).astype(np.float64) for name in (BONES, WEIGHTS))
+        used = shares > 0.0
+        columns, values = numbers[used].round().astype(np.int64), shares[used]
+        rows = np.nonzero(used)[0]
+        if columns.size and not 0 <= columns.min() <= columns.max() < width:
+            raise PointCloudError(
+                f'Attribute {BONES} of "{obj.name}" has numbers of bones beyond the {width} it names. Run Automatic'
+                " Weights again."
+            )
+    return sparse.csr_array((np.asarray(values, np.float64), (rows, columns)), shape=(count, width))
+
+
+def write_weights(obj, names, weights):
+    """Write the weights of all points, replacing those of the same names and, of a point cloud, all others.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    names : sequence of str, (b,)
+        Vertex groups of other names are left as they are.
+    weights : array_like or sparse array, (n, b)
+        From 0 to 1. A point cloud keeps the `MOST` largest of each point, with the same sum.
+    """
+    dense = weights.toarray() if sparse.issparse(weights) else np.asarray(weights)
+    if obj.type == "MESH":
+        for name, column in zip(names, dense.T, strict=True):
+            old = obj.vertex_groups.get(name)
+            if old is not None:
+                obj.vertex_groups.remove(old)
+            add_group(obj, name, np.where(column >= _LEAST, column, 0.0))
+    else:
+        most = min(MOST, dense.shape[1])
+        order = np.argsort(-dense, axis=1, kind="stable")[:, :most]
+        largest = np.take_along_axis(dense, order, axis=1)
+        kept = largest.sum(axis=1, keepdims=True)
+        largest *= dense.sum(axis=1, keepdims=True) / np.where(kept > 0.0, kept, 1.0)
+        fill = ((0, 0), (0, MOST - most))
+        write_attribute(obj.data, BONES, np.pad(order, fill), "FLOAT_COLOR")
+        write_attribute(obj.data, WEIGHTS, np.pad(largest, fill), "FLOAT_COLOR")
+        obj.data[NAMES] = list(names)
+    tag_changed(obj.data)
+
+
+def remove_weights(obj):
+    """Remove the table of a point cloud."""
+    remove_attributes(obj.data, BONES, WEIGHTS)
+    obj.data.pop(NAMES, None)
