@@ -5,7 +5,6 @@ numbers, are a custom property of the data.
 """
 
 import numpy as np
-from scipy import sparse
 
 from ...core import PointCloudError
 from ..objects.attributes import point_count, read_attribute, remove_attributes, tag_changed, write_attribute
@@ -32,7 +31,7 @@ def weight_names(obj) -> list:
 
 
 def read_weights(obj):
-    """Return the weights of all points, a sparse array (n, b) of float64, in the order of `weight_names`.
+    """Return the weights of all points, (n, b) float64, in the order of `weight_names`.
 
     Raises
     ------
@@ -57,7 +56,9 @@ def read_weights(obj):
                 f'Attribute {BONES} of "{obj.name}" has numbers of bones beyond the {width} it names. Run Automatic'
                 " Weights again."
             )
-    return sparse.csr_array((np.asarray(values, np.float64), (rows, columns)), shape=(count, width))
+    weights = np.zeros((count, width))
+    np.add.at(weights, (rows, columns), values)
+    return weights
 
 
 def write_weights(obj, names, weights):
@@ -68,22 +69,21 @@ def write_weights(obj, names, weights):
     obj : bpy.types.Object
     names : sequence of str, (b,)
         Vertex groups of other names are left as they are.
-    weights : array_like or sparse array, (n, b)
+    weights : ndarray, (n, b)
         From 0 to 1. A point cloud keeps the `MOST` largest of each point, with the same sum.
     """
-    dense = weights.toarray() if sparse.issparse(weights) else np.asarray(weights)
     if obj.type == "MESH":
-        for name, column in zip(names, dense.T, strict=True):
+        for name, column in zip(names, weights.T, strict=True):
             old = obj.vertex_groups.get(name)
             if old is not None:
                 obj.vertex_groups.remove(old)
             add_group(obj, name, np.where(column >= _LEAST, column, 0.0))
     else:
-        most = min(MOST, dense.shape[1])
-        order = np.argsort(-dense, axis=1, kind="stable")[:, :most]
-        largest = np.take_along_axis(dense, order, axis=1)
+        most = min(MOST, weights.shape[1])
+        order = np.argsort(-weights, axis=1, kind="stable")[:, :most]
+        largest = np.take_along_axis(weights, order, axis=1)
         kept = largest.sum(axis=1, keepdims=True)
-        largest *= dense.sum(axis=1, keepdims=True) / np.where(kept > 0.0, kept, 1.0)
+        largest *= weights.sum(axis=1, keepdims=True) / np.where(kept > 0.0, kept, 1.0)
         fill = ((0, 0), (0, MOST - most))
         write_attribute(obj.data, BONES, np.pad(order, fill), "FLOAT_COLOR")
         write_attribute(obj.data, WEIGHTS, np.pad(largest, fill), "FLOAT_COLOR")
