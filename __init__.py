@@ -33,6 +33,7 @@ def _modules():
         preferences,
         presets,
         range_selection,
+        rig,
         show,
     )
     from .ui import deform as deform_panel
@@ -64,6 +65,7 @@ def _modules():
         points,
         applications,
         deform_panel,
+        rig,
         menus,
         keys,
         overlay,

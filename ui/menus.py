@@ -47,6 +47,11 @@ def _draw_object(menu, context):
     menu.layout.menu(MESHFREE_MT_object.__name__)
 
 
+def _draw_parent(menu, context):
+    menu.layout.separator()
+    menu.layout.operator("meshfree.auto_weights", text="With Mesh-Free Weights")
+
+
 def _draw_points(menu, context):
     menu.layout.separator()
     menu.layout.menu(MESHFREE_MT_points.__name__)
@@ -113,6 +118,7 @@ _EDITING = {
 def entries():
     """Yield menus with their additional draw functions; point clouds have an Edit Mode from Blender 4.5 on."""
     yield bpy.types.VIEW3D_MT_object, _draw_object
+    yield bpy.types.VIEW3D_MT_object_parent, _draw_parent
     yield bpy.types.VIEW3D_MT_object_context_menu, _draw_object_quick
     for menu, draw in _EDITING.items():
         if hasattr(bpy.types, menu):

@@ -88,6 +88,9 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
             draw_text(column, context, f'Handle of "{handled.name}"', "OUTLINER_OB_EMPTY")
             draw_text(column, context, "G moves it, R rotates it", "BLANK1")
             return  # more is in the panel of the deformation
+        if obj is not None and obj.type == "ARMATURE":
+            draw_text(layout, context, "Select points, too: Rig lets them follow its bones", "OUTLINER_OB_ARMATURE")
+            return
         if reason:
             column = layout.column(align=True)
             for sentence in (reason if obstacle(obj, ("EDIT",)) else _EDITING).split(". "):

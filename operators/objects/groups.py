@@ -118,11 +118,22 @@ def chosen_members(obj, name: str, setting: str, least: int = 1):
 def add_group(obj, name: str, weights):
     """Add a vertex group by the weights of all points, (n,) from 0 to 1, without those of weight 0."""
     group = obj.vertex_groups.new(name=name)
+    _fill(group, weights)
+    return group
+
+
+def put_group(obj, name: str, weights):
+    """Do the same, in the place of a vertex group of that name, if there is one."""
+    group = obj.vertex_groups.get(name) or obj.vertex_groups.new(name=name)
+    group.remove(range(len(weights)))
+    _fill(group, weights)
+
+
+def _fill(group, weights):
     order = np.argsort(weights, kind="stable")
     for part in np.split(order, np.flatnonzero(np.diff(weights[order])) + 1):
         if weights[part[0]]:
             group.add(part.tolist(), float(weights[part[0]]), "REPLACE")
-    return group
 
 
 def check_assignable(obj, name: str, must_exist: bool):

@@ -38,6 +38,44 @@ def deforming_bones(armature) -> Bones:
     return Bones([bone.name for bone in bones], heads, tails)
 
 
+def chosen_armature(context):
+    """Return the active armature, or the only selected one, or that which the active object follows; else None."""
+    active = context.object
+    if active is not None and active.type == "ARMATURE":
+        return active
+    selected = [obj for obj in context.selected_objects if obj.type == "ARMATURE"]
+    if selected:
+        return selected[0] if len(selected) == 1 else None
+    return followed_armature(active)
+
+
+def followed_armature(obj):
+    """Return the armature that an object follows, by its modifiers or as its child; None if there is none."""
+    if obj is None:
+        return None
+    found = [item.object for item in obj.modifiers if item.type == "ARMATURE"] + [obj.parent]
+    return next((other for other in found if other is not None and other.type == "ARMATURE"), None)
+
+
+def ends_seen_from(obj, armature, bones):
+    """Return heads and tails of bones in the space in which the points of an object are read, (b, 3) each.
+
+    That is world space, moved by the object's location; see `Reading`.
+
+    Raises
+    ------
+    PointCloudError
+        The armature is scaled to nothing along an axis.
+    """
+    matrix = np.array(armature.matrix_world)
+    if not np.linalg.cond(matrix[:3, :3]) < 1e6:
+        raise PointCloudError(
+            f'"{armature.name}" is scaled to nothing along an axis. Give it a scale above zero along each axis.'
+        )
+    shift = matrix[:3, 3] - np.array(obj.matrix_world.translation)
+    return tuple(ends @ matrix[:3, :3].T + shift for ends in (bones.heads, bones.tails))
+
+
 def pose_matrices(armature, names):
     """Return how bones have moved since rest, in the armature's space, (b, 4, 4).
 

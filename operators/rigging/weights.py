@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core import PointCloudError
 from ..objects.attributes import point_count, read_attribute, remove_attributes, tag_changed, write_attribute
-from ..objects.groups import add_group
+from ..objects.groups import put_group
 
 BONES, WEIGHTS = "lb_bones", "lb_bone_weights"  # attributes of point clouds, four numbers each
 NAMES = "lb_bone_names"  # custom property of their data
@@ -68,16 +68,13 @@ def write_weights(obj, names, weights):
     ----------
     obj : bpy.types.Object
     names : sequence of str, (b,)
-        Vertex groups of other names are left as they are.
+        Vertex groups of other names are left as they are, and those of these names stay in their places.
     weights : ndarray, (n, b)
         From 0 to 1. A point cloud keeps the `MOST` largest of each point, with the same sum.
     """
     if obj.type == "MESH":
         for name, column in zip(names, weights.T, strict=True):
-            old = obj.vertex_groups.get(name)
-            if old is not None:
-                obj.vertex_groups.remove(old)
-            add_group(obj, name, np.where(column >= _LEAST, column, 0.0))
+            put_group(obj, name, np.where(column >= _LEAST, column, 0.0))
     else:
         most = min(MOST, weights.shape[1])
         order = np.argsort(-weights, axis=1, kind="stable")[:, :most]

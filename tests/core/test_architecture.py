@@ -59,7 +59,7 @@ OPERATORS = {  # what each wing may import, beside itself and core
     "tools": ("objects.", "running."),
     "deform": ("objects.", "running.", "tools.select."),  # for the base class of what works on selected points
     "rigging": ("objects.", "running.", "deform."),
-    "files": ("objects.", "running.", "tools."),  # for the command line, which runs them
+    "files": ("objects.", "running.", "tools.", "rigging."),  # for the command line, which runs them
 }
 
 

@@ -25,6 +25,7 @@ _BLOCK = 1 << 12
 _SAMPLES = 64  # places along a bone that are inside or not
 _INSIDE = 0.5  # winding number from which a place is inside
 _BESIDE = 5e-4  # keeps bones in front of a point at a finite distance
+_SMALL = 0.05  # of the extent of the points: bones that extend less may have another scale
 _FLOOR = 1e-3  # of the spacing: a bone may pass through a point
 
 
@@ -37,6 +38,7 @@ def bone_weights(
     visible: bool = True,
     influences: int | None = None,
     least: float = 0.0,
+    notices: list[str] | None = None,
     progress: Progress | None = None,
 ) -> Floats:
     """Find how much each point of a surface follows each bone.
@@ -55,6 +57,8 @@ def bone_weights(
         Most bones that a point follows; all by default.
     least : float
         Smaller weights become zero, from 0 to below 1; the largest of a point stays.
+    notices : list of str, optional
+        Gets texts about points that see no bone, and about bones that are small beside the points.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
@@ -68,7 +72,8 @@ def bone_weights(
     InvalidPointsError
         Ends of another shape, not finite, or none.
     PointCloudError
-        A falloff that is not above zero, influences below one, or a least weight of 1 and more.
+        A falloff that is not above zero, influences below one, or a least weight of 1 and more; bones farther from the
+        points than either extends.
 
     See Also
     --------
@@ -112,7 +117,10 @@ def bone_weights(
     most = int(min(most, len(heads)))
     report("Bones", 0.0)
     kept = np.flatnonzero(laplacian.component >= 0)
-    distance, near = _seen_bones(laplacian, kept, heads, tails, visible, report)
+    told = _check_extents(laplacian.points, np.concatenate([heads, tails]))
+    distance, near, unseen = _seen_bones(laplacian, kept, heads, tails, visible, report)
+    if notices is not None:
+        notices += told + ([_unseen_text(unseen, len(kept))] if unseen else [])
     heat = 2.0 * laplacian.areas[kept] * near.sum(axis=1) / (width * distance) ** 2
     result = np.empty((len(laplacian.points), len(heads)))
     result[kept] = _equilibrium(laplacian, kept, heat, near, report)
@@ -151,12 +159,30 @@ def strongest(weights: Floats, most: int, least: float) -> Floats:
     return result / result.sum(axis=1, keepdims=True)
 
 
+def _check_extents(points: Floats, ends: Floats) -> list[str]:
+    """Return a notice of bones that are small beside the points; refuse those that are far away."""
+    low, high = (np.array([part(points, axis=0), part(ends, axis=0)]) for part in (np.min, np.max))
+    size, extent = np.linalg.norm(high - low, axis=1)
+    gap = np.linalg.norm(np.maximum(low.max(axis=0) - high.min(axis=0), 0.0))
+    if gap > max(size, extent):
+        raise PointCloudError(
+            f"The bones are {gap:.3g} away from the points. The points extend over {size:.3g}, the bones over"
+            f" {extent:.3g}. Bring both to the same place and scale."
+        )
+    if extent < _SMALL * size:
+        return [
+            f"The bones extend over {extent:.3g} only, the points over {size:.3g}. See whether both have the same scale."
+        ]
+    return []
+
+
 def _seen_bones(
     laplacian: LaplaceBeltrami, kept: Ints, heads: Floats, tails: Floats, visible: bool, report: Progress
-) -> tuple[Floats, sparse.csr_array]:
+) -> tuple[Floats, sparse.csr_array, int]:
     """Return how far the nearest bone is that each kept point sees, (m,), and shares of those as near, (m, b).
 
-    Rows of shares sum to one; those of points that see no bone are empty. Where no point does, none needs to.
+    Rows of shares sum to one; those of points that see no bone, whose number is the third result, are empty. Where no
+    point sees any, all take the nearest bones.
     """
     points, normals = laplacian.surface_points[kept], laplacian.normals[kept]
     floor = _FLOOR * np.sqrt(np.median(laplacian.areas[kept]))
@@ -166,9 +192,23 @@ def _seen_bones(
         ends = _parts_inside(heads, tails, inside)
         found = _nearest_bones(points, normals, ends, floor, lambda rows, ends: inside.sees(starts[rows], ends), report)
         if found[1].nnz:
-            return found
-    return _nearest_bones(
+            return *found, int(np.count_nonzero(np.diff(found[1].indptr) == 0))
+    found = _nearest_bones(
         points, None, (heads, tails), floor, lambda rows, ends: np.ones(len(rows), dtype=bool), report
+    )
+    return *found, len(points) if visible else 0
+
+
+def _unseen_text(unseen: int, count: int) -> str:
+    """Return the notice of points that see no bone."""
+    if unseen == count:
+        return (
+            "No bone lies inside the body, so that all points take the nearest bones, as without Visible. Move the bones"
+            " inside, or orient the normals outwards."
+        )
+    return (
+        f"{unseen:,} of {count:,} points see no bone without leaving the body: their weights come from the points around"
+        " them."
     )
 
 

@@ -1,0 +1,250 @@
+"""Automatic Weights: how much each point follows each bone of an armature, and what lets it follow."""
+
+from typing import NamedTuple
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, FloatProperty, IntProperty
+from mathutils import Matrix
+
+from ... import core
+from ...core import PointCloudError
+from ..objects.groups import has_group
+from ..objects.modifiers import is_own
+from ..objects.reading import TYPES, find_object, obstacle, sharing_objects
+from ..objects.splats import has_splats
+from ..registration import Registration, Row
+from ..running.application import ApplicationOperator, Tool, operator_reader
+from .bones import chosen_armature, deforming_bones, ends_seen_from
+from .weights import MOST, read_weights, weight_names, write_weights
+
+_NAMED = 5  # bones that a notice names
+_MOVED = 1e-5  # of the extent of the bones: they were moved meanwhile
+
+
+class _Weighted(NamedTuple):
+    """Weights of the points of an object, and of which bones, as they lay when the points were read."""
+
+    armature: int  # session_uid
+    names: list
+    ends: np.ndarray  # (2, b, 3)
+    weights: np.ndarray  # (n, b)
+    notices: list
+
+
+class AutoWeights(Tool):
+    """The settings and the work of `meshfree.auto_weights`."""
+
+    asks = ("falloff", "influences", "least", "visible")
+    at_zero = {"influences": "Any"}
+
+    falloff: FloatProperty(
+        name="Falloff",
+        description="Width of the blend between two bones, in distances from the surface to the bones",
+        default=1.0,
+        min=0.01,
+        soft_min=0.25,
+        soft_max=4.0,
+    )
+    influences: IntProperty(
+        name="Influences",
+        description="How many bones a point follows at most; 0 for any number, in point clouds and splats 4 at most",
+        default=MOST,
+        min=0,
+        soft_max=8,
+        max=999,
+    )
+    least: FloatProperty(
+        name="Least Weight",
+        description="Smaller weights become zero; the largest of a point stays",
+        default=0.01,
+        min=0.0,
+        max=0.5,
+        subtype="FACTOR",
+    )
+    visible: BoolProperty(
+        name="Visible",
+        description="Points follow only bones that they see within the body, and not those of a limb beside it",
+        default=True,
+    )
+
+    @classmethod
+    def armature_of(cls, context):
+        """Return the armature whose bones the points shall follow, or None."""
+        return chosen_armature(context)
+
+    def plan(self, context, obj):
+        armature = self.armature_of(context)
+        bones = deforming_bones(armature)
+        _check_objects(obj, armature, bones.names)
+        uid, ends = armature.session_uid, np.array(ends_seen_from(obj, armature, bones))
+        for other in [] if self.becomes_single(obj) else sharing_objects(obj):
+            if _have_moved(ends, ends_seen_from(other, armature, bones)):
+                raise PointCloudError(
+                    f'"{other.name}" shares its mesh and lies elsewhere, where the bones give it other weights. Turn on'
+                    " Make Single User to give each a mesh of its own."
+                )
+        _, operator = operator_reader(context, obj)
+        settings = {"falloff": self.falloff, "least": self.least, "visible": self.visible}
+        most = self.influences or None
+        settings["influences"] = most if _takes_groups(obj) else min(most or MOST, MOST)
+
+        def compute(progress):
+            laplacian = operator(lambda stage, fraction: progress(stage, 0.6 * fraction))
+            notices = [*laplacian.notices]
+            weights = core.bone_weights(
+                laplacian,
+                *ends,
+                **settings,
+                notices=notices,
+                progress=lambda stage, fraction: progress(stage, 0.6 + 0.4 * fraction),
+            )
+            return _Weighted(uid, bones.names, ends, weights, notices)
+
+        return compute
+
+    def write(self, context, obj, result):
+        armature = find_object(result.armature)
+        if armature is None:
+            raise PointCloudError("The armature was deleted meanwhile. Start it again with another one.")
+        bones = deforming_bones(armature)
+        if bones.names != result.names or _have_moved(result.ends, ends_seen_from(obj, armature, bones)):
+            raise PointCloudError(f'Bones of "{armature.name}" were changed or moved meanwhile. Start it again.')
+        locked = _write(obj, result.names, result.weights)
+        for user in (obj, *sharing_objects(obj)):
+            _bind(user, armature)
+        largest = result.weights.max(axis=0)
+        without = [name for name, most in zip(result.names, largest, strict=True) if most == 0.0]
+        notices = [
+            *result.notices,
+            *_named(locked, "Locked vertex groups, left as they are, with the others normalized around them"),
+            *_named(without, "Bones that no point follows"),
+        ]
+        followed = len(result.names) - len(without)
+        line = f"{obj.name}: {len(result.weights):,} points follow {followed} bones of {armature.name}"
+        return [*notices, line]
+
+
+def _check_objects(obj, armature, names):
+    """Refuse an object that cannot follow these bones, before anything is computed."""
+    if _moves_with(armature, obj):
+        raise PointCloudError(
+            f'"{armature.name}" moves with "{obj.name}", its parent. Clear the parent of the armature (Alt P).'
+        )
+    taken = [name for name in names if name in obj.data.attributes and not has_group(obj, name)]
+    if taken and obj.type == "MESH":
+        raise PointCloudError(
+            f'"{obj.name}" has attributes named {", ".join(taken)}, and vertex groups share their names. Rename these'
+            " attributes or bones."
+        )
+    if obj.meshfree.use_modifiers and any(item.type == "ARMATURE" for item in obj.modifiers):
+        raise PointCloudError(
+            f'"{obj.name}" is read after its Armature modifier, in a pose. Turn off Use Modifiers, so that its points'
+            " are read at rest, as the bones are."
+        )
+
+
+def _moves_with(obj, other):
+    """Whether an object is another one, a child of it, or a child of such."""
+    while obj is not None and obj != other:
+        obj = obj.parent
+    return obj is not None
+
+
+def _have_moved(ends, now):
+    """Whether bones lie elsewhere, seen from the points."""
+    return np.abs(np.array(now) - ends).max() > _MOVED * np.ptp(ends.reshape(-1, 3), axis=0).max()
+
+
+def _takes_groups(obj):
+    """Whether an object follows bones by vertex groups and Blender's own modifier."""
+    return obj.type == "MESH" and not has_splats(obj.data)
+
+
+def _write(obj, names, weights):
+    """Write weights but for locked vertex groups, and return the names of these.
+
+    Of a point they leave so much to the others that the sum is one.
+    """
+    locked = [name for name in names if name in obj.vertex_groups and obj.vertex_groups[name].lock_weight]
+    free = np.array([name not in locked for name in names])
+    weights = weights[:, free]
+    if locked:
+        held = read_weights(obj)[:, [weight_names(obj).index(name) for name in locked]].sum(axis=1)
+        total = weights.sum(axis=1)
+        weights = weights * (np.maximum(1.0 - held, 0.0) / np.where(total > 0.0, total, 1.0))[:, None]
+    write_weights(obj, [name for name in names if name not in locked], weights)
+    return locked
+
+
+def _named(names, what):
+    """Return a notice that names some of these, if there are any."""
+    if not names:
+        return []
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    return [f"{what}: {', '.join(names[:_NAMED])}{more}."]
+
+
+def _bind(obj, armature):
+    """Let an object follow an armature by its weights, as Blender's own Automatic Weights leaves it; it stays there."""
+    if _takes_groups(obj):
+        _add_modifier(obj, armature)
+    _set_parent(obj, armature)
+
+
+def _add_modifier(obj, armature):
+    """Add an Armature modifier for an armature, before our own ones, unless there is one."""
+    if any(item.type == "ARMATURE" and item.object == armature for item in obj.modifiers):
+        return
+    first = next((index for index, item in enumerate(obj.modifiers) if is_own(item)), len(obj.modifiers))
+    modifier = obj.modifiers.new("Armature", "ARMATURE")
+    modifier.object = armature
+    obj.modifiers.move(len(obj.modifiers) - 1, first)
+
+
+def _set_parent(obj, armature):
+    """Make an armature the parent of an object, which stays where it is, with its own channels as they are."""
+    if obj.parent == armature and obj.parent_type == "OBJECT":
+        return
+    inverse = armature.matrix_world.inverted() @ _from_parent(obj)
+    obj.parent, obj.parent_type = armature, "OBJECT"
+    obj.matrix_parent_inverse = inverse
+
+
+def _from_parent(obj):
+    """Return the transform that an object has from its parent; constraints come after it."""
+    if obj.parent is None:
+        return Matrix()
+    if obj.parent_type == "OBJECT":
+        return obj.parent.matrix_world @ obj.matrix_parent_inverse
+    return obj.matrix_world @ obj.matrix_basis.inverted()
+
+
+class MESHFREE_OT_auto_weights(AutoWeights, ApplicationOperator, bpy.types.Operator):
+    """Let selected points follow the bones of an armature, by weights that flow along the surface"""
+
+    bl_idname = "meshfree.auto_weights"
+    bl_label = "Automatic Weights"
+
+    @classmethod
+    def subject(cls, context):
+        """Return the first object whose points shall follow."""
+        found = [obj for obj in (context.object, *context.selected_objects) if obj is not None and obj.type in TYPES]
+        return next((obj for obj in found if not obstacle(obj, cls.works_in)), found[0] if found else context.object)
+
+    @classmethod
+    def obstacle(cls, context):
+        armature = cls.armature_of(context)
+        if armature is None:
+            return "No armature is chosen. Select the points, then an armature, which becomes the active object"
+        if armature.mode == "EDIT":
+            return f'"{armature.name}" is in Edit Mode. Switch to Object Mode first'
+        subject = cls.subject(context)
+        if subject == armature:
+            return f'"{armature.name}" is selected alone. Select the points too that shall follow its bones'
+        return super().obstacle(context)
+
+
+TOOLS = (
+    Registration(MESHFREE_OT_auto_weights, panel=Row("Rig", 1, 1), menu=Row("Object", 8, 11), verb=AutoWeights),
+)
