@@ -68,6 +68,7 @@ from .applications.motion.reaction import Mixture as Mixture
 from .applications.motion.reaction import ReactionDiffusion as ReactionDiffusion
 from .applications.motion.wave_modes import wave_modes as wave_modes
 from .applications.rigging.bone_weights import bone_weights as bone_weights
+from .applications.rigging.bone_weights import nearest_bones as nearest_bones
 from .applications.rigging.inpainting import inpaint as inpaint
 from .applications.rigging.inpainting import smooth_weights as smooth_weights
 from .applications.rigging.skinning import skin as skin

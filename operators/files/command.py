@@ -12,11 +12,13 @@ from .. import registration
 from ..objects.groups import SOURCE
 from .bending import Deform, SplatInfo
 from .measure_verbs import MeasureFile, ProfileBetween, Section
+from .rigging import Rig
 from .tool_verbs import AlignWith, AlongCurve, CompareWith, Frames, FromSources, Mesh, Orient
 from .verbs import Analyze, Apply
 
 _OWN = {
     "align_points": AlignWith,
+    "auto_weights": Rig,
     "signed_distance": AlongCurve,
     "measure_parts": MeasureFile,
     "mesh_surface": Mesh,

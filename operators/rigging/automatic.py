@@ -8,7 +8,7 @@ from bpy.props import BoolProperty, FloatProperty, IntProperty
 from mathutils import Matrix
 
 from ... import core
-from ...core import PointCloudError
+from ...core import NotASurfaceError, PointCloudError, TooFewPointsError
 from ..objects.groups import has_group
 from ..objects.modifiers import is_own
 from ..objects.reading import TYPES, find_object, obstacle, sharing_objects
@@ -18,6 +18,7 @@ from ..running.application import ApplicationOperator, Tool, operator_reader
 from .bones import chosen_armature, deforming_bones, ends_seen_from
 from .weights import MOST, read_weights, weight_names, write_weights
 
+_BUILDING = 0.6  # share of the time that the operator takes
 _NAMED = 5  # bones that a notice names
 _MOVED = 1e-5  # of the extent of the bones: they were moved meanwhile
 
@@ -84,21 +85,25 @@ class AutoWeights(Tool):
                     f'"{other.name}" shares its mesh and lies elsewhere, where the bones give it other weights. Turn on'
                     " Make Single User to give each a mesh of its own."
                 )
-        _, operator = operator_reader(context, obj)
+        reading, operator = operator_reader(context, obj)
         settings = {"falloff": self.falloff, "least": self.least, "visible": self.visible}
         most = self.influences or None
         settings["influences"] = most if _takes_groups(obj) else min(most or MOST, MOST)
 
         def compute(progress):
-            laplacian = operator(lambda stage, fraction: progress(stage, 0.6 * fraction))
-            notices = [*laplacian.notices]
-            weights = core.bone_weights(
-                laplacian,
-                *ends,
-                **settings,
-                notices=notices,
-                progress=lambda stage, fraction: progress(stage, 0.6 + 0.4 * fraction),
-            )
+            def part(first, share):
+                return lambda stage, fraction: progress(stage, first + share * fraction)
+
+            notices = []
+            try:
+                laplacian = operator(part(0.0, _BUILDING))
+            except (TooFewPointsError, NotASurfaceError) as error:
+                notices.append(f"Each point follows the nearest bone alone, since there is no surface: {error}")
+                weights = core.nearest_bones(reading.points, *ends)
+            else:
+                notices += laplacian.notices
+                rest = part(_BUILDING, 1.0 - _BUILDING)
+                weights = core.bone_weights(laplacian, *ends, **settings, notices=notices, progress=rest)
             return _Weighted(uid, bones.names, ends, weights, notices)
 
         return compute
@@ -111,6 +116,7 @@ class AutoWeights(Tool):
         if bones.names != result.names or _have_moved(result.ends, ends_seen_from(obj, armature, bones)):
             raise PointCloudError(f'Bones of "{armature.name}" were changed or moved meanwhile. Start it again.')
         locked = _write(obj, result.names, result.weights)
+        others = _other_armatures(obj, armature)
         for user in (obj, *sharing_objects(obj)):
             _bind(user, armature)
         largest = result.weights.max(axis=0)
@@ -119,6 +125,7 @@ class AutoWeights(Tool):
             *result.notices,
             *_named(locked, "Locked vertex groups, left as they are, with the others normalized around them"),
             *_named(without, "Bones that no point follows"),
+            *_named(others, "Armatures that it follows beside this one, by modifiers"),
         ]
         followed = len(result.names) - len(without)
         line = f"{obj.name}: {len(result.weights):,} points follow {followed} bones of {armature.name}"
@@ -175,6 +182,12 @@ def _write(obj, names, weights):
         weights = weights * (np.maximum(1.0 - held, 0.0) / np.where(total > 0.0, total, 1.0))[:, None]
     write_weights(obj, [name for name in names if name not in locked], weights)
     return locked
+
+
+def _other_armatures(obj, armature):
+    """Names of other armatures that modifiers of an object refer to."""
+    found = [item.object for item in obj.modifiers if item.type == "ARMATURE"]
+    return [other.name for other in found if other is not None and other != armature]
 
 
 def _named(names, what):
@@ -245,6 +258,4 @@ class MESHFREE_OT_auto_weights(AutoWeights, ApplicationOperator, bpy.types.Opera
         return super().obstacle(context)
 
 
-TOOLS = (
-    Registration(MESHFREE_OT_auto_weights, panel=Row("Rig", 1, 1), menu=Row("Object", 8, 11), verb=AutoWeights),
-)
+TOOLS = (Registration(MESHFREE_OT_auto_weights, panel=Row("Rig", 1, 1), menu=Row("Object", 8, 11), verb=AutoWeights),)

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from ...algebra import blocks, on_all_cores, solve_columns, sparsify
 from ...arguments import as_doubles, check_array, check_finite, check_switches, not_negative, positive, whole
 from ...errors import InvalidPointsError, PointCloudError
-from ...geometry import nearest_rows
+from ...geometry import check_points, nearest_rows
 from ...operator import LaplaceBeltrami
 from ...types import Bools, Floats, Ints, Progress
 from ..graph import followers
@@ -79,6 +79,7 @@ def bone_weights(
     --------
     skin : Moves the points with the bones.
     smooth_weights, inpaint : Change weights that are there.
+    nearest_bones : For few points, which are no surface.
 
     Notes
     -----
@@ -129,6 +130,46 @@ def bone_weights(
     return strongest(result, most, least)
 
 
+def nearest_bones(points: ArrayLike, heads: ArrayLike, tails: ArrayLike) -> Floats:
+    """Let each point follow the nearest bone alone, or those that are as near: for few points, which are no surface.
+
+    Parameters
+    ----------
+    points : array_like, (n, 3)
+    heads, tails : array_like, (b, 3)
+        Ends of the bones [L], in the space of the points.
+
+    Returns
+    -------
+    ndarray, (n, b)
+        Weights from 0 to 1; rows sum to one.
+
+    Raises
+    ------
+    InvalidPointsError
+        Points, or ends of bones, of another shape or not finite, or none.
+    PointCloudError
+        Bones farther from the points than either extends.
+
+    See Also
+    --------
+    bone_weights : Blends them along a surface.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import core
+    >>> points = core.example_sphere()
+    >>> weights = core.nearest_bones(points[[0, 799]], [[0, 0, -0.8], [0, 0, 0]], [[0, 0, 0], [0, 0, 0.8]])
+    >>> print(weights[:, 1])
+    [1. 0.]
+    """
+    points = check_points(points)
+    heads, tails = check_bones(heads, tails)
+    _check_extents(points, np.concatenate([heads, tails]))
+    return _nearest_to_all(points, heads, tails, 0.0, lambda stage, fraction: None)[1].toarray()
+
+
 def check_bones(heads: ArrayLike, tails: ArrayLike) -> tuple[Floats, Floats]:
     """Return the ends of bones, (b, 3) each.
 
@@ -171,7 +212,7 @@ def _check_extents(points: Floats, ends: Floats) -> list[str]:
         )
     if extent < _SMALL * size:
         return [
-            f"The bones extend over {extent:.3g} only, the points over {size:.3g}. See whether both have the same scale."
+            f"The bones extend over {extent:.3g} only, the points over {size:.3g}. See whether both are of one scale."
         ]
     return []
 
@@ -193,22 +234,29 @@ def _seen_bones(
         found = _nearest_bones(points, normals, ends, floor, lambda rows, ends: inside.sees(starts[rows], ends), report)
         if found[1].nnz:
             return *found, int(np.count_nonzero(np.diff(found[1].indptr) == 0))
-    found = _nearest_bones(
+    found = _nearest_to_all(points, heads, tails, floor, report)
+    return *found, len(points) if visible else 0
+
+
+def _nearest_to_all(
+    points: Floats, heads: Floats, tails: Floats, floor: float, report: Progress
+) -> tuple[Floats, sparse.csr_array]:
+    """Return the same as `_nearest_bones` of points that see all bones."""
+    return _nearest_bones(
         points, None, (heads, tails), floor, lambda rows, ends: np.ones(len(rows), dtype=bool), report
     )
-    return *found, len(points) if visible else 0
 
 
 def _unseen_text(unseen: int, count: int) -> str:
     """Return the notice of points that see no bone."""
     if unseen == count:
         return (
-            "No bone lies inside the body, so that all points take the nearest bones, as without Visible. Move the bones"
-            " inside, or orient the normals outwards."
+            "No point sees a bone from inside the body, so that all take the nearest ones. Move the bones inside, or"
+            " orient the normals outwards."
         )
     return (
-        f"{unseen:,} of {count:,} points see no bone without leaving the body: their weights come from the points around"
-        " them."
+        f"{unseen:,} of {count:,} points see no bone without leaving the body: their weights come from the points"
+        " around them."
     )
 
 
