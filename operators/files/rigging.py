@@ -47,7 +47,7 @@ class Rig(Apply):
             tool.armature = _append(arguments.armature, name)
         else:
             own = None if name else followed_armature(obj)
-            there = [each.name for each in bpy.context.scene.objects if _is_armature(each)]
+            there = sorted(each.name for each in bpy.context.scene.objects if _is_armature(each))
             tool.armature = own or bpy.data.objects[_choose(path, there, name)]
 
     def save(self, tool, obj, output):
@@ -92,7 +92,7 @@ def _append(path, name):
     known = set(bpy.data.libraries)
     with bpy.data.libraries.load(str(path), link=True) as (found, wanted):
         wanted.objects = found.objects
-    names = [obj.name for obj in wanted.objects if obj is not None and _is_armature(obj)]
+    names = sorted(obj.name for obj in wanted.objects if obj is not None and _is_armature(obj))
     chosen = _choose(path, names, name)
     bpy.data.batch_remove(set(bpy.data.libraries) - known)
     with bpy.data.libraries.load(str(path)) as (_, wanted):

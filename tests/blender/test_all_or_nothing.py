@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
+from tests.blender.armatures import add_armature, choose
 from tests.blender.clouds import add_group, add_object, differences, everything, grid_points, sphere_points
 from tests.blender.conftest import new_file, part
 from tests.blender.operators import applications
@@ -193,8 +194,18 @@ def bound():
     return obj
 
 
+def boned():
+    """A sphere in which an armature lies, the active object, with other weights of one of its bones."""
+    obj = handled()
+    add_group(obj, "upper", [1, 2], 0.5)
+    armature = add_armature({"lower": ((0, 0, -0.8), (0, 0, 0)), "upper": ((0, 0, 0), (0, 0, 0.8))})
+    choose(armature, obj)
+    return obj
+
+
 FIRST = {  # what is there before tools that a sphere with groups is not enough for, and what they have to be told
     "align_points": (compared, {}),
+    "auto_weights": (boned, {}),
     "compare": (compared, {}),
     "compare_swap": (compared_before, {}),
     "deform_update": (bound, {}),

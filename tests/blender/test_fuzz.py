@@ -13,6 +13,7 @@ import bpy
 import numpy as np
 import pytest
 
+from tests.blender.armatures import add_armature, choose
 from tests.blender.clouds import add_group, add_object, everything, grid_points, sphere_points
 from tests.blender.conftest import part
 from tests.blender.splats import add_splats, bar_splats
@@ -179,6 +180,20 @@ def rigged(obj):
     obj.parent = rig
 
 
+def with_armature(make, active=True):
+    """An object, and an armature within it, which is the active one or only selected."""
+
+    def made():
+        obj = make()
+        armature = add_armature({"lower": ((0, 0, -0.8), (0, 0, 0)), "upper": ((0, 0, 0), (0, 0, 0.8))})
+        choose(armature, obj)
+        if not active:
+            bpy.context.view_layer.objects.active = obj
+        return bpy.context.view_layer.objects.active
+
+    return made
+
+
 def animated(obj):
     for frame in (1, 5):
         obj.location.x = 0.1 * frame
@@ -274,6 +289,10 @@ OBJECTS = {
     "overridden object": from_library("object"),
     "overridden": from_library("object", "data"),
     "rigged": changed(rigged),
+    "in an armature": with_armature(sphere),
+    "around an armature": with_armature(changed(with_keys), active=False),
+    "splats in an armature": with_armature(of_splats("Splats")),
+    "few points in an armature": with_armature(odd_points(lambda points: points[:7])),
     "animated": changed(animated),
     "driven": changed(driven),
     "bound": changed(bound),
