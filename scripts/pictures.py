@@ -17,6 +17,7 @@ from mathutils import Vector
 import demo
 import package
 import paper_pictures
+import rig_pictures
 import scan_pictures
 import studio
 from coral import spread_directions
@@ -434,6 +435,7 @@ PICTURES = {
     "motion_reaction": motion("REACTION", 100, distance=0.55),
     "motion_front": motion("FRONT", 70, width=0.4),
     **paper_pictures.PICTURES,
+    **rig_pictures.PICTURES,
     **scan_pictures.PICTURES,
 }
 

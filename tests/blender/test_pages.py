@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
+from tests.blender.armatures import add_armature
 from tests.blender.clouds import add_group, add_object, sphere_points
 from tests.blender.splats import bar_splats
 from tests.blender.test_command import run  # noqa: F401
@@ -60,6 +61,8 @@ def folder(core, tmp_path, monkeypatch):
     small = replace(bar, positions=np.float32(0.4 * bar.positions), scales=np.float32(0.4 * bar.scales))
     for name in ("guitar", "a", "b"):
         core.write_splats(tmp_path / f"{name}.ply", small)
+    add_armature({"Bone": ((0.0, 0.0, 0.0), (0.0, 0.0, 0.8))})
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "rig.blend"))
     [handles] = snippets("json")
     (tmp_path / "bend.json").write_text(handles.text)
     return tmp_path
