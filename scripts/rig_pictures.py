@@ -12,7 +12,7 @@ TOWARD = (0.6, -0.8, 0.3)  # near the arm whose bone is shown
 
 
 def armature(points):
-    """Add an armature with a bone in each arm of the demonstration's shape, and return it with the one to show."""
+    """Add an armature with a bone in each arm of the demonstration's shape; return the name of the bone to show."""
     directions = spread_directions(ARMS)
     along = points @ directions.T
     tips = [points[(along[:, arm] - 2.0 * _beside(points, directions[arm])).argmax()] for arm in range(ARMS)]
@@ -24,7 +24,7 @@ def armature(points):
         bone = obj.data.edit_bones.new(f"Arm {number}")
         bone.head, bone.tail = 0.15 * tip, 0.85 * tip
     bpy.ops.object.mode_set(mode="OBJECT")
-    return obj, f"Arm {(directions @ TOWARD).argmax()}"
+    return f"Arm {(directions @ TOWARD).argmax()}"
 
 
 def _beside(points, direction):
@@ -37,7 +37,7 @@ def auto_weights(path):
     objects = []
     for own in (True, False):
         obj = studio.make_object(points, "Coral")
-        rig, bone = armature(points)
+        bone = armature(points)
         obj.select_set(True)
         if own:
             bpy.ops.meshfree.auto_weights()
