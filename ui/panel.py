@@ -8,7 +8,7 @@ from ..operators.objects.attributes import DISC, eigenvector_name, mode_number, 
 from ..operators.objects.colors import own_colors, own_material, shows_own_material
 from ..operators.objects.modifiers import has_input, input_property, is_own, is_sequence
 from ..operators.objects.quantities import APPLICATIONS, DEVIATION, RESULTS, quantity
-from ..operators.objects.reading import obstacle, sharing_objects
+from ..operators.objects.reading import TYPES, obstacle, sharing_objects
 from ..operators.objects.result import area_text, is_analyzed, is_stale, is_trusted, read_eigenvalues
 from ..operators.objects.splats import LEFT_BEHIND, are_left_behind, has_splats
 from ..operators.running.application import ApplicationOperator
@@ -89,7 +89,7 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
             draw_text(column, context, "G moves it, R rotates it", "BLANK1")
             return  # more is in the panel of the deformation
         if obj is not None and obj.type == "ARMATURE":
-            draw_text(layout, context, "Select points, too: Rig lets them follow its bones", "OUTLINER_OB_ARMATURE")
+            _draw_followers(layout, context)
             return
         if reason:
             column = layout.column(align=True)
@@ -153,6 +153,18 @@ def _draw_compared(layout, context, obj):
     column = layout.column(align=True)
     draw_text(column, context, f"{obj.name} compared with {kept.compared_with.name}{hidden}", "INFO")
     column.operator("meshfree.compare_swap", text="Swap").greatest = kept.compared_within
+
+
+def _draw_followers(layout, context):
+    """Draw the selected objects whose points may follow the active armature, with their notices."""
+    chosen = [other for other in context.selected_objects if other.type in TYPES]
+    if not chosen:
+        draw_text(layout, context, "Select points, too: Rig lets them follow the bones", "OUTLINER_OB_ARMATURE")
+    for other in chosen:
+        column = layout.column()
+        column.context_pointer_set("object", other)  # whose notices are dismissed
+        draw_text(column, context, f"{other.name}: {point_count(other.data):,} points", f"OUTLINER_OB_{other.type}")
+        _draw_notices(column, context, other)
 
 
 def _draw_notices(layout, context, obj):

@@ -63,3 +63,13 @@ def test_a_bone_that_is_turned_in_pose_mode_takes_its_points_along(gui):
     gui.key("ctrl+z")
     gui.settle()
     assert max(gui.python(SHIFTS)) < 1e-4
+
+
+def test_the_panel_of_the_armature_dismisses_notices_of_its_points(gui):
+    gui.python(ARMATURES)
+    gui.python(CLOUD)
+    gui.python("bpy.ops.meshfree.auto_weights(least=0.5); obj.meshfree.notices.clear()")
+    gui.python("for number in range(2): obj.meshfree.notices.add().text = str(number)")
+    gui.open_tab()
+    gui.press("meshfree.dismiss", across=0.81)
+    gui.wait_until("[notice.text for notice in bpy.data.objects['Cloud'].meshfree.notices] == ['1']")
