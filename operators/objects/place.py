@@ -72,6 +72,13 @@ def move_object(obj, matrix):
         )
 
 
+def moves_with(obj, other) -> bool:
+    """Whether an object is another one, a child of it, or a child of such."""
+    while obj is not None and obj != other:
+        obj = obj.parent
+    return obj is not None
+
+
 def hide(obj, hidden=True):
     """Hide an object in views and in renders, or show it."""
     obj.hide_set(hidden)

@@ -11,6 +11,7 @@ from ... import core
 from ...core import NotASurfaceError, PointCloudError, TooFewPointsError
 from ..objects.groups import has_group
 from ..objects.modifiers import is_own
+from ..objects.place import moves_with
 from ..objects.reading import TYPES, find_object, obstacle, sharing_objects
 from ..objects.splats import has_splats
 from ..registration import Registration, Row
@@ -136,7 +137,7 @@ class AutoWeights(Tool):
 
 def _check_objects(obj, armature, names):
     """Refuse an object that cannot follow these bones, before anything is computed."""
-    if _moves_with(armature, obj):
+    if moves_with(armature, obj):
         raise PointCloudError(
             f'"{armature.name}" moves with "{obj.name}", its parent. Clear the parent of the armature (Alt P).'
         )
@@ -151,13 +152,6 @@ def _check_objects(obj, armature, names):
             f'"{obj.name}" is read after its Armature modifier, in a pose. Turn off Use Modifiers, so that its points'
             " are read at rest, as the bones are."
         )
-
-
-def _moves_with(obj, other):
-    """Whether an object is another one, a child of it, or a child of such."""
-    while obj is not None and obj != other:
-        obj = obj.parent
-    return obj is not None
 
 
 def _have_moved(ends, now):

@@ -8,7 +8,7 @@ from mathutils import Matrix
 from ... import core
 from ...core import PointCloudError
 from ..objects.attributes import tag_changed, write_attribute
-from ..objects.place import check_movable, move_object
+from ..objects.place import check_movable, move_object, moves_with
 from ..objects.quantities import RESIDUAL
 from ..objects.reading import TYPES, find_object, obstacle, read_points
 from ..objects.result import length_text
@@ -158,16 +158,9 @@ class MESHFREE_OT_align_points(Align, ShownOperator, bpy.types.Operator):
             many = f"{len(found)} others are" if found else "no other is"
             return f'"{context.object.name}" is aligned with one other cloud, and {many} selected. Select one'
         (other,) = found
-        if _moves_with(other, context.object):
+        if moves_with(other, context.object):
             return f'"{other.name}" moves with "{context.object.name}", its parent. Make it the active one'
         return obstacle(other)
-
-
-def _moves_with(obj, other):
-    """Whether an object is a child of another, or a child of such."""
-    while obj is not None and obj != other:
-        obj = obj.parent
-    return obj is not None
 
 
 TOOLS = (Registration(MESHFREE_OT_align_points, panel=Row("Measure", 5, 1), menu=Row("Object", 2, 3), verb=Align),)
