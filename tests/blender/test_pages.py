@@ -11,6 +11,7 @@ import pytest
 
 from tests.blender.armatures import add_armature
 from tests.blender.clouds import add_group, add_object, sphere_points
+from tests.blender.conftest import new_file
 from tests.blender.splats import bar_splats
 from tests.blender.test_command import run  # noqa: F401
 from tests.pages import ROOT, snippets
@@ -63,6 +64,7 @@ def folder(core, tmp_path, monkeypatch):
         core.write_splats(tmp_path / f"{name}.ply", small)
     add_armature({"Bone": ((0.0, 0.0, 0.0), (0.0, 0.0, 0.8))})
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "rig.blend"))
+    new_file()
     [handles] = snippets("json")
     (tmp_path / "bend.json").write_text(handles.text)
     return tmp_path

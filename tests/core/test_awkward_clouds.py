@@ -440,6 +440,7 @@ def calls():
     yield core.harmonic_field, on, {"fixed": [0, 299], "fixed_values": [0.0, 1.0]}
     bones = {"heads": [[0.0, 0.0, -0.8], [0.0, 0.0, 0.0]], "tails": [[0.0, 0.0, 0.0], [0.0, 0.0, 0.8]]}
     yield core.bone_weights, on, {**bones, "falloff": 1.0, "visible": True, "influences": 1, "least": 0.1}
+    yield core.nearest_bones, {}, {"points": points, **bones}
     yield core.inpaint, on, {"known": [0, 299], "values": [0.0, 1.0], "biharmonic": True}
     yield core.smooth_weights, on, {"weights": np.ones((n, 2)), "length": 0.1, "locked": [0]}
     yield core.skin, {"gradients": False}, {"points": points, "weights": np.ones((n, 1)), "matrices": np.eye(4)[None]}

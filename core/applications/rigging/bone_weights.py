@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from ...algebra import blocks, on_all_cores, solve_columns, sparsify
 from ...arguments import as_doubles, check_array, check_finite, check_switches, not_negative, positive, whole
 from ...errors import InvalidPointsError, PointCloudError
-from ...geometry import check_points, nearest_rows
+from ...geometry import nearest_rows
 from ...operator import LaplaceBeltrami
 from ...types import Bools, Floats, Ints, Progress
 from ..graph import followers
@@ -164,10 +164,13 @@ def nearest_bones(points: ArrayLike, heads: ArrayLike, tails: ArrayLike) -> Floa
     >>> print(weights[:, 1])
     [1. 0.]
     """
-    points = check_points(points)
+    places = as_doubles(check_array(points, "Points", [(None, 3)], "Give x, y, z of each point."))
+    check_finite(places, "points", "Delete these points.")
     heads, tails = check_bones(heads, tails)
-    _check_extents(points, np.concatenate([heads, tails]))
-    return _nearest_to_all(points, heads, tails, 0.0, lambda stage, fraction: None)[1].toarray()
+    if not len(places):
+        raise InvalidPointsError("There are no points. Give at least one.")
+    _check_extents(places, np.concatenate([heads, tails]))
+    return _nearest_to_all(places, heads, tails, 0.0, lambda stage, fraction: None)[1].toarray()
 
 
 def check_bones(heads: ArrayLike, tails: ArrayLike) -> tuple[Floats, Floats]:
