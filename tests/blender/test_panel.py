@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests import splat_files
+from tests.blender.armatures import add_armature, choose
 from tests.blender.clouds import add_object, attribute, grid_points, sphere_points
 from tests.blender.conftest import part
 from tests.blender.operators import NOT_TOOLS, OPERATORS, tools
@@ -27,6 +28,7 @@ PANELS = (
     "segment",
     "simulate",
     "deform",
+    "rig",
     "minimal",
 )
 TWINS = {"display_properties": "display", "settings_properties": "settings"}  # in the Properties editor
@@ -332,6 +334,20 @@ def test_panels_draw_every_tool_that_has_a_row(core):
     rows = {name: tool.panel.text or tool.operator.bl_label for name, tool in tools().items() if tool.panel}
     assert len(rows) > 25
     assert [name for name, text in rows.items() if not {text, f"{text}..."} & texts] == []
+
+
+def test_panels_of_an_armature_show_the_selected_points_and_their_notices():
+    obj = add_object(sphere_points())
+    part("operators.objects.notices").keep(obj, "Tool", "a notice")
+    armature = add_armature({"Bone": ((0, 0, -0.5), (0, 0, 0.5))})
+    choose(armature)
+    assert "Select points, too" in " ".join(draw())
+    choose(armature, obj)
+    texts = " ".join(draw())
+    for expected in ("Cloud: 1,000 points", "a notice", "Bones of Rig", "Automatic Weights..."):
+        assert expected in texts
+    choose(obj, obj, armature)
+    assert "Bones of Rig" in " ".join(draw())
 
 
 def test_all_panels_are_known_to_these_tests():
