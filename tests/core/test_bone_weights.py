@@ -1,21 +1,17 @@
 """How much points follow bones, against a cylinder's answer and invariants."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 import core
 from benchmarks.samplings import fibonacci_sphere, random_sphere
 from tests.core.rods import axis_of
+from tests.core.test_skinning import turned, volume
 
 GIVEN = np.random.default_rng(4)
-
-
-def turned(axis, angle, shift=(0.0, 0.0, 0.0), about=(0.0, 0.0, 0.0)):
-    """Matrix of a rotation by an angle around an axis through a place, and a shift, (3, 4)."""
-    axis = np.asarray(axis, float) / np.linalg.norm(axis)
-    cross = np.cross(np.eye(3), axis)
-    rotation = np.eye(3) + np.sin(angle) * cross.T @ np.eye(3) * -1.0 + (1 - np.cos(angle)) * cross @ cross
-    return np.column_stack([rotation, np.asarray(shift) + about - rotation @ about])
 
 
 def two_bones(points):
@@ -80,6 +76,46 @@ class TestBoneWeights:
         assert seen[:1500, 1].max() < 1e-3
         assert seen[1500:, 0].max() < 1e-3
         assert core.bone_weights(laplacian, heads, tails, visible=False)[:1500, 1].max() > 0.5
+
+    def test_no_bone_reaches_across_the_gap_between_two_bodies_a_spacing_apart(self):
+        """A flat hand on a hip: the bone of the hand is nearer to the skin of the hip below it than that of the hip."""
+
+        def slab(count, half):
+            ball = fibonacci_sphere(count)
+            return ball / np.sum(np.abs(ball / half) ** 6, axis=1)[:, None] ** (1.0 / 6.0)
+
+        hip, hand = slab(2000, [1.0, 1.0, 0.6]), slab(700, [0.5, 0.5, 0.15])
+        height = 0.75 + np.sqrt(core.build_laplacian(hip).areas.mean())
+        laplacian = core.build_laplacian(np.concatenate([hip, hand + [0.0, 0.0, height]]))
+        weights = core.bone_weights(laplacian, [[-0.8, 0, 0], [-0.4, 0, height]], [[0.8, 0, 0], [0.4, 0, height]])
+        assert weights[:2000, 1].max() < 1e-3
+        assert weights[2000:, 0].max() < 1e-3
+
+    def test_no_weight_jumps_between_neighbors_where_bones_lie_close_below_the_surface(self):
+        points = random_sphere(2000)
+        laplacian = core.build_laplacian(points)
+        ends = 0.98 * np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+        weights = core.bone_weights(laplacian, ends[:2], ends[1:])
+        near = cKDTree(points).query(points, k=7)[1][:, 1:]
+        assert np.abs(weights[near, 0] - weights[:, :1]).max() < 0.35
+        assert weights[:, 0].max() > 0.9
+
+    def test_points_with_reversed_normals_follow_those_around(self, bar):
+        points, laplacian = bar
+        weights = core.bone_weights(laplacian, *two_bones(points))
+        wrong = np.arange(0, len(points), 50)
+        normals = laplacian.normals.copy()
+        normals[wrong] *= -1.0
+        found = core.bone_weights(replace(laplacian, normals=normals), *two_bones(points))
+        assert found[wrong] == pytest.approx(weights[wrong], abs=0.05)
+
+    def test_an_elbow_keeps_its_volume_by_screws(self):
+        angle = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+        points = np.array([[x, 0.3 * np.cos(a), 0.3 * np.sin(a)] for x in np.linspace(-2, 2, 61) for a in angle])
+        weights = core.bone_weights(core.build_laplacian(points), [[-1.9, 0, 0], [0, 0, 0]], [[0, 0, 0], [1.9, 0, 0]])
+        pose = [turned((0, 1, 0), 0.0), turned((0, 1, 0), np.pi / 2)]
+        bent = core.skin(points, weights, pose, dual_quaternions=True)
+        assert volume(bent, 24) == pytest.approx(volume(points, 24), rel=0.01)
 
     def test_bones_outside_still_move_points(self):
         points = fibonacci_sphere(1500)

@@ -18,6 +18,7 @@ from ...operator import LaplaceBeltrami
 from ...types import Bools, Floats, Ints, Progress
 from ..graph import followers
 from .inside import Inside
+from .touching import apart
 
 _SAME = 1e-3  # of the distance to the nearest bone, within which others are as near
 _ACCURACY = 2e-4  # of the equations: weights are right to 1e-4
@@ -26,6 +27,7 @@ _SAMPLES = 64  # places along a bone that are inside or not
 _INSIDE = 0.5  # winding number from which a place is inside
 _BESIDE = 5e-4  # keeps bones in front of a point at a finite distance
 _SMALL = 0.05  # of the extent of the points: bones that extend less may have another scale
+_RESOLVED = 3.0  # smoothing lengths, the radius of the kernel: narrower blends would be jumps between points
 _FLOOR = 1e-3  # of the spacing: a bone may pass through a point
 
 
@@ -50,7 +52,8 @@ def bone_weights(
     heads, tails : array_like, (b, 3)
         Ends of the bones [L], in the space of the points.
     falloff : float
-        Width of the blend between two bones, in distances to the nearest bone; above zero.
+        Width of the blend between two bones, in distances to the nearest bone; above zero. No blend is narrower than
+        the kernel, so that weights do not jump from a point to the next.
     visible : bool
         A bone warms only points that it reaches without leaving the body, and only its part within the body counts.
     influences : int, optional
@@ -83,11 +86,12 @@ def bone_weights(
 
     Notes
     -----
-    Heat on the surface in equilibrium: ``Delta w + 2 (p - w) / (falloff d)^2 = 0`` with the distance d to the nearest
-    bone that a point sees, and p one for that bone, shared where several are as near, and zero for the others. Points
-    that see no bone take what flows from around. The matrix has nothing positive off its diagonal, so that weights lie
-    between 0 and 1 and sum to one by themselves. What lies inside is told by winding numbers of areas and normals, so
-    that it needs no faces. On a component of which no point sees a bone, that is not asked for.
+    Heat on the surface in equilibrium: ``Delta w + 2 (p - w) / (f d)^2 = 0`` with the falloff f, the distance d to the
+    nearest bone that a point sees, and p one for that bone, shared where several are as near, and zero for the others.
+    The product f d is three smoothing lengths at least. Points that see no bone take what flows from around. The matrix
+    has nothing positive off its diagonal, so that weights lie between 0 and 1 and sum to one by themselves. What lies
+    inside is told by winding numbers of areas and normals, so that it needs no faces. On a component of which no point
+    sees a bone, that is not asked for.
 
     References
     ----------
@@ -122,7 +126,8 @@ def bone_weights(
     distance, near, unseen = _seen_bones(laplacian, kept, heads, tails, visible, report)
     if notices is not None:
         notices += told + ([_unseen_text(unseen, len(kept))] if unseen else [])
-    heat = 2.0 * laplacian.areas[kept] * near.sum(axis=1) / (width * distance) ** 2
+    blend = np.maximum(width * distance, _RESOLVED * laplacian.smoothing_lengths[kept])
+    heat = 2.0 * laplacian.areas[kept] * near.sum(axis=1) / blend**2
     result = np.empty((len(laplacian.points), len(heads)))
     result[kept] = _equilibrium(laplacian, kept, heat, near, report)
     lone, leader = followers(laplacian.points, laplacian.component)
@@ -328,7 +333,8 @@ def _equilibrium(
 ) -> Floats:
     """Return the weights of points in equilibrium, (m, b); components without heat have those of the nearest other."""
     points = laplacian.surface_points[kept]
-    stiffness = _apart(sparsify(laplacian.stiffness[kept][:, kept]), laplacian.normals[kept])
+    stiffness, unsure = apart(sparsify(laplacian.stiffness[kept][:, kept]), laplacian.normals[kept])
+    heat = np.where(unsure, 0.0, heat)
     component = connected_components(stiffness, directed=False)[1]
     warm = np.bincount(component, heat)[component] > 0.0
     rows, cold = np.flatnonzero(warm), np.flatnonzero(~warm)
@@ -340,12 +346,3 @@ def _equilibrium(
     if len(cold):
         result[cold] = result[rows[nearest_rows(points[rows], points[cold])]]
     return result
-
-
-def _apart(stiffness: sparse.csr_array, normals: Floats) -> sparse.csr_array:
-    """Leave out pairs whose normals differ by more than a right angle: sheets that touch, as a hand and a hip."""
-    pairs = stiffness.tocoo()
-    first, second = pairs.coords
-    same = (np.einsum("ij,ij->i", normals[first], normals[second]) > 0.0) & (first != second)
-    weights = sparse.csr_array((-pairs.data[same], (first[same], second[same])), shape=stiffness.shape)
-    return (sparse.diags_array(weights.sum(axis=1), format="csr") - weights).tocsr()
