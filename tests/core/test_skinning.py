@@ -98,6 +98,6 @@ def volume(points, around):
     a, b = rings[:-1], rings[1:]
     c, d = np.roll(a, -1, axis=1), np.roll(b, -1, axis=1)
     total = sum(np.einsum("rpi,rpi->", p, np.cross(q, r)) for p, q, r in ((a, b, c), (b, d, c)))
-    for ring, sign in ((rings[0], 1.0), (rings[-1], -1.0)):
+    for ring, sign in ((rings[0], -1.0), (rings[-1], 1.0)):
         total += sign * np.einsum("pi,pi->", ring, np.cross(np.roll(ring, -1, axis=0), ring.mean(axis=0)[None]) * -1.0)
     return abs(total) / 6.0
