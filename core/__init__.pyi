@@ -26,6 +26,7 @@ from .applications.deforming.deformation import Deformer as Deformer
 from .applications.deforming.gradients import deformation_gradients as deformation_gradients
 from .applications.deforming.minimal_surface import MinimalSurface as MinimalSurface
 from .applications.deforming.minimal_surface import minimal_surface as minimal_surface
+from .applications.distance.falloff import falloff as falloff
 from .applications.distance.geodesics import Geodesics as Geodesics
 from .applications.distance.geodesics import geodesic_distance as geodesic_distance
 from .applications.distance.geodesics import nearest_source as nearest_source
@@ -70,8 +71,8 @@ from .applications.motion.wave_modes import wave_modes as wave_modes
 from .applications.rigging.bone_weights import bone_weights as bone_weights
 from .applications.rigging.bone_weights import nearest_bones as nearest_bones
 from .applications.rigging.inpainting import inpaint as inpaint
-from .applications.rigging.inpainting import smooth_weights as smooth_weights
 from .applications.rigging.skinning import skin as skin
+from .applications.rigging.smoothing import smooth_weights as smooth_weights
 from .applications.spectral.descriptors import heat_kernel_signature as heat_kernel_signature
 from .applications.spectral.descriptors import signature_energies as signature_energies
 from .applications.spectral.descriptors import signature_times as signature_times

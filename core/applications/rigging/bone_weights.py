@@ -132,7 +132,7 @@ def bone_weights(
     result[kept] = _equilibrium(laplacian, kept, heat, near, report)
     lone, leader = followers(laplacian.points, laplacian.component)
     result[lone] = result[leader]
-    return strongest(result, most, least)
+    return strongest(result / result.sum(axis=1, keepdims=True), most, least)
 
 
 def nearest_bones(points: ArrayLike, heads: ArrayLike, tails: ArrayLike) -> Floats:
@@ -196,16 +196,21 @@ def check_bones(heads: ArrayLike, tails: ArrayLike) -> tuple[Floats, Floats]:
     return first, second
 
 
-def strongest(weights: Floats, most: int, least: float) -> Floats:
-    """Return weights, (n, b), of which so many of each row, and none below the least, are left; rows sum to one."""
+def strongest(weights: Floats, most: int | Ints, least: float) -> Floats:
+    """Return weights, (n, b), of which so many of each row, and none below the least, are left.
+
+    The largest stays, and rows have the sum that they had.
+    """
     result = np.maximum(weights, 0.0)
-    if most < result.shape[1]:
+    total = result.sum(axis=1, keepdims=True)
+    if np.min(most) < result.shape[1]:
         order = np.argsort(-result, axis=1, kind="stable")
         rank = np.empty_like(order)
         np.put_along_axis(rank, order, np.arange(result.shape[1])[None], axis=1)
-        result[rank >= most] = 0.0
+        result[rank >= np.reshape(most, (-1, 1))] = 0.0
     result[(result < least) & (result < result.max(axis=1, keepdims=True))] = 0.0
-    return result / result.sum(axis=1, keepdims=True)
+    left = result.sum(axis=1, keepdims=True)
+    return result * (total / np.where(left > 0.0, left, 1.0))
 
 
 def _check_extents(points: Floats, ends: Floats) -> list[str]:

@@ -1,4 +1,4 @@
-"""Weights, or any functions, where only some points have them, and smoother ones along the surface."""
+"""Weights, or any functions, where only some points have them."""
 
 from __future__ import annotations
 
@@ -11,13 +11,12 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from ...algebra import dissect, factorize, sparsify
-from ...arguments import as_doubles, check_array, check_finite, check_switches, not_negative
-from ...errors import InvalidPointsError, PointCloudError
-from ...geometry import Prolongation, as_indices, as_mask, blue_noise_subset, nearest_rows
+from ...arguments import as_doubles, check_array, check_finite, check_switches
+from ...errors import PointCloudError
+from ...geometry import Prolongation, as_indices, blue_noise_subset, nearest_rows
 from ...operator import LaplaceBeltrami, narrow_laplacian
 from ...types import Floats, Ints, Progress
 from ..graph import followers
-from ..motion.motion import Heat
 
 _MOST = 10_000  # points, which are solved on within two seconds; of more, so many are
 
@@ -121,90 +120,6 @@ def inpaint(
     result = few.carry(found)
     result[known] = columns
     return result.reshape(count, *given.shape[1:])
-
-
-def smooth_weights(
-    laplacian: LaplaceBeltrami,
-    weights: ArrayLike,
-    length: float,
-    *,
-    locked: ArrayLike | None = None,
-    progress: Progress | None = None,
-) -> Floats:
-    """Smooth weights along the surface.
-
-    Parameters
-    ----------
-    laplacian : LaplaceBeltrami
-        Of n points.
-    weights : array_like, (n, b)
-        Not negative. Points whose weights are all zero are filled from those around first.
-    length : float
-        How far weights are spread [L]; zero fills only.
-    locked : array_like, (b,) bool or (k,) int, optional
-        Columns that stay as they are.
-    progress : callable, optional
-        Called as ``progress(stage, fraction)``; may raise `Cancelled`.
-
-    Returns
-    -------
-    ndarray, (n, b)
-        Not negative. Where rows summed to one, they do. With locked columns the others share what these leave.
-
-    Raises
-    ------
-    InvalidPointsError
-        Weights of another shape, negative, not finite, or all zero.
-    PointCloudError
-        A length that is negative.
-
-    See Also
-    --------
-    bone_weights : Weights from an armature.
-
-    Notes
-    -----
-    The flow of heat for the time ``length^2 / 4``, within which nothing leaves its range, or flows across gaps between
-    sheets.
-
-    Examples
-    --------
-    A sharp edge of a weight becomes soft:
-
-    >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> hard = np.column_stack([points[:, 2] > 0, points[:, 2] <= 0]).astype(float)
-    >>> soft = core.smooth_weights(core.build_laplacian(points), hard, 0.5)
-    >>> print(soft[[0, 400], 0].round(1), np.allclose(soft.sum(axis=1), 1))
-    [1.  0.5] True
-    """
-    count = len(laplacian.points)
-    given = as_doubles(
-        check_array(weights, "Weights", [(count, None)], f"Give one row for each of {count} points.", "biuf")
-    )
-    check_finite(given, "weights", "Replace them.")
-    negative = np.count_nonzero((given < 0.0).any(axis=1))
-    total = given.sum(axis=1)
-    if negative or not total.any():
-        wrong = f"{negative} points have negative weights" if negative else "All weights are zero"
-        raise InvalidPointsError(f"{wrong}. Give weights from 0 on, and some above it.")
-    reach = not_negative(length, "length")
-    held = as_mask(() if locked is None else locked, given.shape[1])
-    result = given
-    empty = total == 0.0
-    if empty.any():
-        filled = np.flatnonzero(~empty)
-        result = inpaint(laplacian, filled, given[filled], biharmonic=False, progress=progress)
-        total = result.sum(axis=1)
-    if reach > 0.0 and not held.all():
-        result = Heat(laplacian, 0.25 * reach**2, progress=progress).advance(result, progress=progress)
-    if not held.any():
-        return result
-    # The others share what the locked ones leave.
-    kept, moving = given[:, held].sum(axis=1), result[:, ~held].sum(axis=1)
-    scale = np.maximum(total - kept, 0.0) / np.where(moving > 0.0, moving, 1.0)
-    return np.where(held, given, result * scale[:, None])
 
 
 @dataclass(frozen=True)
