@@ -18,6 +18,7 @@ ROUGHNESS, SURFACE_VARIATION = "lb_roughness", "lb_surface_variation"
 FIELD = "lb_field"
 DISTANCE, SIGNED_DISTANCE, DEVIATION = "lb_distance", "lb_signed_distance", "lb_deviation"
 RESIDUAL = "lb_residual"
+WEIGHT = "lb_weight"
 CELL, DIRECTION, UV = "lb_cell", "lb_direction", "lb_uv"
 DISPLACEMENT = "lb_displacement"
 MOTION, MOTION_MODE = "lb_motion", "lb_motion_"
@@ -214,6 +215,13 @@ QUANTITIES = (  # in the order of the panel
         bounds=(0.0, 1.0 / 3.0),
     ),
     Quantity(FIELD, "Field", "The smoothest field between given values", "harmonic_field"),
+    Quantity(
+        WEIGHT,
+        "Weight",
+        "Weight in the group that Weights from Selection wrote last",
+        "weights_from_selection",
+        bounds=(0.0, 1.0),
+    ),
     Quantity(
         DISTANCE,
         "Distance",

@@ -114,8 +114,9 @@ def edited_objects(context):
 
 @contextmanager
 def object_mode(context, obj):
-    """Leave Edit Mode, where vertices cannot be read as arrays, and return to it with the same objects."""
-    if obj.mode != "EDIT":
+    """Leave Edit Mode, where vertices cannot be read as arrays, or Weight Paint; return with the same objects."""
+    mode = obj.mode
+    if mode not in ("EDIT", "WEIGHT_PAINT"):
         yield
         return
     others = [other for other in context.view_layer.objects if other != obj]
@@ -127,7 +128,7 @@ def object_mode(context, obj):
     finally:
         for other in others:  # selected ones enter Edit Mode too
             other.select_set(other in edited)
-        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.object.mode_set(mode=mode)
         for other in others:
             other.select_set(other in chosen)
 

@@ -58,7 +58,7 @@ OPERATORS = {  # what each wing may import, beside itself and core
     "running": ("objects.",),
     "tools": ("objects.", "running."),
     "deform": ("objects.", "running.", "tools.select."),  # for the base class of what works on selected points
-    "rigging": ("objects.", "running.", "deform."),
+    "rigging": ("objects.", "running.", "deform.", "tools.select"),  # for what is done with selected points
     "files": ("objects.", "running.", "tools.", "rigging."),  # for the command line, which runs them
 }
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from ...arguments import as_doubles, check_array, check_finite, not_negative, whole
+from ...arguments import as_doubles, check_array, check_finite, check_switches, not_negative, whole
 from ...errors import InvalidPointsError, PointCloudError
 from ...geometry import as_mask
 from ...operator import LaplaceBeltrami
@@ -31,6 +31,7 @@ def smooth_weights(
     locked: ArrayLike | None = None,
     chosen: ArrayLike | None = None,
     edges: ArrayLike | None = None,
+    fill: bool = True,
     influences: int | None = None,
     least: float = 0.0,
     progress: Progress | None = None,
@@ -42,7 +43,7 @@ def smooth_weights(
     laplacian : LaplaceBeltrami
         Of n points.
     weights : array_like, (n, b)
-        Not negative. Points whose weights are all zero are filled from those around first.
+        Not negative.
     length : float
         How far weights are spread [L]; zero spreads none.
     columns : array_like, (b,) bool or (k,) int, optional
@@ -53,6 +54,8 @@ def smooth_weights(
         Points whose weights change, all by default. Those of the others flow in, and stay.
     edges : array_like, (m, 2) int, optional
         Of a mesh: nothing flows between its loose parts, even where they touch. Points of no edge belong to all parts.
+    fill : bool
+        Fill points whose weights are all zero from those around first.
     influences : int, optional
         Most weights of a point above zero, locked ones included; all by default. Locked ones, and one other, stay.
     least : float
@@ -99,6 +102,7 @@ def smooth_weights(
     count = len(laplacian.points)
     given = _check_weights(weights, count)
     width = given.shape[1]
+    check_switches(fill=fill)
     reach, least = not_negative(length, "length"), not_negative(least, "least weight")
     most = width if influences is None else whole(influences)
     if not most >= 1:
@@ -109,7 +113,7 @@ def smooth_weights(
     separate = _separated(laplacian, edges)
     result = given
     empty = ~given.any(axis=1)
-    if empty.any():
+    if fill and empty.any():
         filled = np.flatnonzero(~empty)
         result = inpaint(separate, filled, given[filled], biharmonic=False, progress=progress)
     total = result.sum(axis=1)
