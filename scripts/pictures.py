@@ -349,6 +349,36 @@ def field(path):
     single(obj, "lb_field", path)
 
 
+def weights_from_selection(path):
+    """Weights that fall off with the distance from the tip of an arm, and that blend between the tips of two."""
+    objects = [coral(), coral()]
+    for obj in objects:
+        obj.meshfree.iso_lines = LINES
+        studio.group(obj, studio.tip(obj, (-1.0, 0.0, 0.0)), "LOW", grown=0.4)
+        studio.group(obj, studio.tip(obj, (1.0, -1.0, 0.0)), "HIGH", grown=0.4)
+    studio.activate(objects[0])
+    bpy.ops.meshfree.weights_from_selection(group="High", radius=2.0)
+    studio.activate(objects[1])
+    bpy.ops.meshfree.weights_from_selection(group="High", method="BETWEEN")
+    row(objects, path, legend=objects[1])
+
+
+def smooth_weights(path):
+    """Weights of a bone that end at a hard edge, and the same after they were smoothed."""
+    objects = [coral(), coral()]
+    for obj in objects:
+        points = studio.world_points(obj)
+        own = points @ [1.0, -1.0, 0.2] > 0.3
+        part("operators.rigging.weights").write_weights(obj, ["Arm", "Rest"], np.column_stack([own, ~own]) * 1.0)
+    studio.activate(objects[1])
+    bpy.ops.meshfree.smooth_weights(length=0.6)
+    for obj in objects:
+        weights = part("operators.rigging.weights").read_weights(obj)[:, 0]
+        part("operators.objects.attributes").write_attribute(obj.data, "lb_weight", weights)
+        studio.show(obj, "lb_weight")
+    row(objects, path, legend=objects[1])
+
+
 def deform(path):
     """An arm bent by its tip."""
     rest, obj = coral(), coral()
@@ -428,6 +458,8 @@ PICTURES = {
     "unwrap": unwrap,
     "extend_direction": extend_direction,
     "field": field,
+    "weights_from_selection": weights_from_selection,
+    "smooth_weights": smooth_weights,
     "deform": deform,
     "minimal": minimal,
     "motion_heat": motion("HEAT", 70, width=1.0, distance=2.5),

@@ -107,6 +107,12 @@ class MESHFREE_FH_points(bpy.types.FileHandler):
         return context.area is not None and context.area.type == "VIEW_3D"
 
 
+def _draw_weights(menu, context):
+    menu.layout.separator()
+    menu.layout.operator("meshfree.smooth_weights", text="Smooth Along Surface")
+    menu.layout.operator("meshfree.weights_from_selection")
+
+
 _EDITING = {
     "VIEW3D_MT_edit_mesh": _draw_points,
     "VIEW3D_MT_edit_pointcloud": _draw_points,
@@ -119,6 +125,8 @@ def entries():
     """Yield menus with their additional draw functions; point clouds have an Edit Mode from Blender 4.5 on."""
     yield bpy.types.VIEW3D_MT_object, _draw_object
     yield bpy.types.VIEW3D_MT_object_parent, _draw_parent
+    yield bpy.types.VIEW3D_MT_edit_mesh_weights, _draw_weights
+    yield bpy.types.VIEW3D_MT_paint_weight, _draw_weights
     yield bpy.types.VIEW3D_MT_object_context_menu, _draw_object_quick
     for menu, draw in _EDITING.items():
         if hasattr(bpy.types, menu):
