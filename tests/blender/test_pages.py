@@ -58,6 +58,10 @@ def folder(core, tmp_path, monkeypatch):
         for number in (1, 2):
             write_ply(tmp_path / name / f"{name}_{number}.ply", columns(scan * [1.0, 1.0, 1.0 + 0.02 * number]))
     write_las(tmp_path / "first.las", scan)
+    rigged = add_object(scan)
+    for name, members in (("Arm", scan[:, 0] > 0.0), ("Leg", scan[:, 0] <= 0.0)):
+        add_group(rigged, name, members)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "rigged.blend"), copy=True)
     bar = bar_splats(core)
     small = replace(bar, positions=np.float32(0.4 * bar.positions), scales=np.float32(0.4 * bar.scales))
     for name in ("guitar", "a", "b"):

@@ -442,10 +442,12 @@ def calls():
     yield core.bone_weights, on, {**bones, "falloff": 1.0, "visible": True, "influences": 1, "least": 0.1}
     yield core.nearest_bones, {}, {"points": points, **bones}
     yield core.inpaint, on, {"known": [0, 299], "values": [0.0, 1.0], "biharmonic": True}
-    yield core.smooth_weights, on, {"weights": np.ones((n, 2)), "length": 0.1, "locked": [0]}
+    two = {"weights": np.ones((n, 2)), "length": 0.1, "edges": [[0, 1]], "least": 0.1, "influences": 1, "fill": True}
+    yield core.smooth_weights, on, {**two, "columns": [1], "locked": [0], "chosen": [3]}
     yield core.skin, {"gradients": False}, {"points": points, "weights": np.ones((n, 1)), "matrices": np.eye(4)[None]}
     yield core.solve_poisson, on, {"source": points[:, 2], "fixed": [0], "fixed_values": [0.0]}
     yield core.geodesic_distance, on, {"sources": [0]}
+    yield core.falloff, {}, {"distance": points[:, 0] ** 2, "radius": 1.0, "shape": "sharp"}
     yield core.Geodesics(laplacian).distance, {}, {"sources": [0]}
     yield core.nearest_source, on, {"sources": [0, 150]}
     yield core.signed_distance, on, {"curve": [100, 101, 102], "closed": True}

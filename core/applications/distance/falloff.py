@@ -66,7 +66,7 @@ def falloff(distance: ArrayLike, radius: float, shape: str = "smooth") -> Floats
     if wrong:
         raise InvalidPointsError(f"{wrong} of {len(given)} distances are negative or no numbers. Give them from 0 on.")
     reach = positive(radius, "radius")
-    if shape not in _SHAPES:
+    if not isinstance(shape, str) or shape not in _SHAPES:
         raise PointCloudError(f"There is no falloff {shape!r}. Choose from {', '.join(_SHAPES)}.")
     result: Floats = _SHAPES[shape](1.0 - np.minimum(given / reach, 1.0))
     return result
