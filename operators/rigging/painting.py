@@ -17,6 +17,8 @@ class WeightOperator(ApplicationOperator):
 
     def complete(self, context, job):
         obj = job.snapshots[0].find()
+        if obj is not None and obj.mode != "OBJECT" and obj != context.view_layer.objects.active:
+            job.stop(f'Stopped because "{obj.name}" is no longer the active object: nothing was changed')
         if job.reason or obj is None:
             return super().complete(context, job)
         with context.temp_override(object=obj, active_object=obj), object_mode(context, obj):

@@ -116,6 +116,12 @@ def handled():
     return obj
 
 
+def painted():
+    obj = handled()
+    bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
+    return obj
+
+
 def unhandled():
     obj = handled()
     for name in ("Handle", "Anchor"):
@@ -228,6 +234,7 @@ VARIANTS = [
     (keyed, "smooth", {}),
     (handled, "mode_shape", {"animate": True}),
     (handled, "harmonic_field", {}),
+    (painted, "smooth_weights", {"groups": "ALL"}),
     (handled, "geodesic_distance", {}),
     (handled, "deform_bind", {}),
     (unhandled, "deform_bind", {"at_once": True}),
