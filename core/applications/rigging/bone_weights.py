@@ -338,7 +338,8 @@ def _equilibrium(
 ) -> Floats:
     """Return the weights of points in equilibrium, (m, b); components without heat have those of the nearest other."""
     points = laplacian.surface_points[kept]
-    stiffness, unsure = apart(sparsify(laplacian.stiffness[kept][:, kept]), laplacian.normals[kept])
+    matrix = sparsify(laplacian.stiffness[kept][:, kept])
+    stiffness, unsure = apart(matrix, laplacian.normals[kept], laplacian.trust[kept])
     heat = np.where(unsure, 0.0, heat)
     component = connected_components(stiffness, directed=False)[1]
     warm = np.bincount(component, heat)[component] > 0.0

@@ -147,7 +147,7 @@ def _check_weights(weights: ArrayLike, count: int) -> Floats:
 
 def _separated(laplacian: LaplaceBeltrami, edges: ArrayLike | None) -> LaplaceBeltrami:
     """Return the operator without pairs of sheets that touch, or of loose parts of a mesh."""
-    stiffness, _ = apart(laplacian.stiffness, laplacian.normals)
+    stiffness, _ = apart(laplacian.stiffness, laplacian.normals, laplacian.trust)
     if edges is not None:
         count = len(laplacian.points)
         ends = check_array(edges, "Edges", [(None, 2)], "Give two points for each.", "iu").astype(np.int64)
