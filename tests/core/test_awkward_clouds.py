@@ -444,6 +444,13 @@ def calls():
     yield core.inpaint, on, {"known": [0, 299], "values": [0.0, 1.0], "biharmonic": True}
     two = {"weights": np.ones((n, 2)), "length": 0.1, "edges": [[0, 1]], "least": 0.1, "influences": 1, "fill": True}
     yield core.smooth_weights, on, {**two, "columns": [1], "locked": [0], "chosen": [3]}
+    yield core.inpaint_labels, on, {"known": [0, 299], "labels": [0, 1]}
+    match = core.match_surface(laplacian, laplacian)
+    yield core.match_surface, {"target": laplacian, "sources": laplacian}, {"distance": 1.0, "angle": 0.5}
+    yield core.transfer_values, {"target": laplacian, "match": match}, {"values": low}
+    yield core.transfer_labels, {"target": laplacian, "match": match}, {"labels": top}
+    yield core.mix_weights, {}, {"before": np.ones((9, 2)), "taken": np.ones((9, 2)), "mix": 0.5, "locked": [0]}
+    yield core.are_normalized, {}, {"weights": np.ones((9, 2))}
     yield core.skin, {"gradients": False}, {"points": points, "weights": np.ones((n, 1)), "matrices": np.eye(4)[None]}
     yield core.solve_poisson, on, {"source": points[:, 2], "fixed": [0], "fixed_values": [0.0]}
     yield core.geodesic_distance, on, {"sources": [0]}
