@@ -14,6 +14,7 @@ from .bending import Deform, SplatInfo
 from .measure_verbs import MeasureFile, ProfileBetween, Section
 from .rigging import Rig
 from .tool_verbs import AlignWith, AlongCurve, CompareWith, Frames, FromSources, Mesh, Orient
+from .transfer_verbs import AttributesFrom, WeightsFrom
 from .verbs import Analyze, Apply
 
 _OWN = {
@@ -27,6 +28,8 @@ _OWN = {
     "simulate": Frames,
     "cross_section": Section,
     "profile": ProfileBetween,
+    "transfer_attributes": AttributesFrom,
+    "transfer_weights": WeightsFrom,
 }
 _handles = []
 

@@ -207,12 +207,17 @@ class Apply(ObjectVerb):
             add_setting(parser, setting)
         super().add_options(parser)
 
-    def work(self, obj, path, arguments, output):
+    def tool_of(self, obj, arguments):
+        """Return the tool with the settings of the command line; groups are those of an object."""
         tool = self._tool()
         values = {item.identifier: _default(item) for item in self.operator.properties if item.type != "POINTER"}
         values |= {name: value for name, value in vars(arguments).items() if name in values and value is not None}
         values |= {name: files.group_of(obj, value) for name, value in values.items() if _names_group(name)}
         vars(tool).update(values, target="IN_PLACE")
+        return tool
+
+    def work(self, obj, path, arguments, output):
+        tool = self.tool_of(obj, arguments)
         self.prepare(tool, obj, path, arguments)
         plans = tool.plan_all(bpy.context, [obj])
         with Stages(bpy.context.window_manager, self.operator.name) as stages:

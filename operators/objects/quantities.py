@@ -22,6 +22,7 @@ WEIGHT = "lb_weight"
 CELL, DIRECTION, UV = "lb_cell", "lb_direction", "lb_uv"
 DISPLACEMENT = "lb_displacement"
 MOTION, MOTION_MODE = "lb_motion", "lb_motion_"
+TRANSFER = "lb_transfer"
 EIGENVECTOR = "lb_eigenvector_"
 HEAT_SIGNATURE, WAVE_SIGNATURE = "lb_heat_signature_", "lb_wave_signature_"
 
@@ -276,6 +277,15 @@ QUANTITIES = (  # in the order of the panel
     ),
     Quantity(MOTION, "Motion", "Heat, wave, reaction or front at the frame on show", "simulate"),
     Quantity(MOTION_MODE, "Motion Mode", "What a mode adds to the motion at its begin", "simulate", numbered=True),
+    Quantity(
+        TRANSFER,
+        "Transfer",
+        "Whether the point takes its values from the surface of a source, or has them filled in from around",
+        "transfer_weights",
+        data_type="INT",
+        carried="label",
+        names=("Filled In", "Taken", "Far"),
+    ),
     Quantity(EIGENVECTOR, "Mode", "Vibration mode of the surface", "spectrum", power=-1, numbered=True),
     Quantity(
         HEAT_SIGNATURE, "Heat Signature", "Heat that is left after some time", "signature", power=-2, numbered=True

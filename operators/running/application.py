@@ -86,11 +86,13 @@ class ApplicationOperator(Tool, JobOperator):
     @reporting
     def execute(self, context):
         context.view_layer.update()  # a script may have moved or scaled an object a line ago
-        objects, self._left_out = [self.subject(context)], []
-        if not self.only_active:
-            objects, self._left_out = chosen_objects(context, self.becomes_single)
+        objects, self._left_out = self.chosen(context)
         plans = self.plan_all(context, objects, among=context.selected_objects)
         return self.work(context, objects, lambda progress: compute_all(plans, progress))
+
+    def chosen(self, context):
+        """Return the objects to work on, and why others were left out; see `chosen_objects`."""
+        return ([self.subject(context)], []) if self.only_active else chosen_objects(context, self.becomes_single)
 
     def finish(self, context, objects, results):
         """Write what was computed, and report it."""

@@ -180,6 +180,16 @@ def compared_before():
     return obj
 
 
+def lent():
+    """Two selected spheres, of which the one that is not active has weights and a number at its points."""
+    obj = compared()
+    other = bpy.data.objects["Other"]
+    add_group(other, "lower", np.arange(120), 0.5)
+    add_group(other, "Handle", np.arange(50), 0.5)
+    other.data.attributes.new("Own", "FLOAT", "POINT").data.foreach_set("value", np.arange(200.0))
+    return obj
+
+
 def crossed():
     """A sphere with a curve across it."""
     obj = handled()
@@ -221,6 +231,8 @@ FIRST = {  # what is there before tools that a sphere with groups is not enough 
     "signature": (handled, {"count": 3, "modes": 10}),
     "simulate": (handled, {"frames": 3}),
     "signed_distance": (crossed, {"curve": "Curve"}),
+    "transfer_attributes": (lent, {"reverse": True}),
+    "transfer_weights": (lent, {"reverse": True}),
 }
 VARIANTS = [
     (handled, "simulate", {"kind": "FRONT", "frames": 3, "height": 0.1}),

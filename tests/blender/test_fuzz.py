@@ -52,6 +52,16 @@ def changed(change):
     return made
 
 
+def beside_others():
+    """Two spheres with groups, and an attribute, the last one active."""
+    first = sphere()
+    first.data.attributes.new("Own", "FLOAT", "POINT")
+    second = sphere()
+    second.location = 0.05, 0.0, 0.0
+    first.select_set(True)
+    return second
+
+
 def film():
     points, boundary = grid_points(14, 12)
     obj = add_object(points)
@@ -261,6 +271,7 @@ def of_splats(*names):
 
 OBJECTS = {
     "sphere": sphere,
+    "beside others": beside_others,
     "film": film,
     "with faces": faced,
     "analyzed": changed(analyzed),

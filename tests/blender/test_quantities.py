@@ -15,6 +15,7 @@ CALLS = {  # of tools that need arguments, or write more in several calls
     "signed_distance": ({"curve": "Line"},),
     "simulate": ({"keep": "MODES", "modes": 8},),
     "spectrum": ({"count": 3},),
+    "transfer_weights": ({"reverse": True},),
     "signature": ({"kind": "HEAT", "modes": 20}, {"kind": "WAVE", "modes": 20}),
 }
 
@@ -23,8 +24,10 @@ def add_scene(size, tool):
     """Add a dented ellipsoid with what tools ask for: groups, a curve, and a larger one where two are needed."""
     points = size * sphere_points(400) * [1.0, 0.8, 0.6]
     points[::20] *= 0.98
-    if tool in ("align_points", "compare"):
-        add_object((1.02 if tool == "align_points" else 1.1) * points, "Plan").select_set(True)
+    if tool in ("align_points", "compare", "transfer_weights"):
+        plan = add_object((1.1 if tool == "compare" else 1.02) * points, "Plan")
+        plan.select_set(True)
+        add_group(plan, "Bone", [0])
     line = bpy.data.curves.new("Line", "CURVE")
     line.splines.new("POLY").points.add(1)
     line.splines[0].points.foreach_set("co", [*points[0], 1.0, *points[1], 1.0])
