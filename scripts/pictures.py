@@ -20,6 +20,7 @@ import paper_pictures
 import rig_pictures
 import scan_pictures
 import studio
+import transfer_pictures
 from coral import spread_directions
 from studio import part, row, single
 
@@ -469,6 +470,7 @@ PICTURES = {
     **paper_pictures.PICTURES,
     **rig_pictures.PICTURES,
     **scan_pictures.PICTURES,
+    **transfer_pictures.PICTURES,
 }
 
 

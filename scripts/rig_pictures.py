@@ -44,13 +44,18 @@ def auto_weights(path):
         else:
             bpy.ops.object.parent_set(type="ARMATURE_AUTO")
         objects.append(obj)
-        group = obj.vertex_groups[bone].index
-        held = ([item.weight for item in vertex.groups if item.group == group] for vertex in obj.data.vertices)
-        obj.data.attributes.new("Weight", "FLOAT", "POINT").data.foreach_set("value", [sum(each) for each in held])
         obj.modifiers.remove(obj.modifiers["Armature"])
-        studio.show(obj, "Weight")
-        studio.set_range(obj, 0.0, 1.0)
+        show_weights(obj, bone)
     studio.row(objects, path, legend=objects[0])
+
+
+def show_weights(obj, bone):
+    """Show the weights of a bone as colors."""
+    group = obj.vertex_groups[bone].index
+    held = ([item.weight for item in vertex.groups if item.group == group] for vertex in obj.data.vertices)
+    obj.data.attributes.new("Weight", "FLOAT", "POINT").data.foreach_set("value", [sum(each) for each in held])
+    studio.show(obj, "Weight")
+    studio.set_range(obj, 0.0, 1.0)
 
 
 PICTURES = {"auto_weights": auto_weights}

@@ -1,5 +1,6 @@
 """The manual says what the code does: each operator, each setting with its default, examples that run."""
 
+import math
 import re
 from pathlib import Path
 
@@ -76,6 +77,8 @@ def default(item):
     if item.type == "STRING":
         return f"`{item.default}`" if item.default else "empty"
     values = item.default_array if item.is_array else [item.default]
+    if item.subtype == "ANGLE":
+        values = [math.degrees(value) for value in values]
     return ", ".join(f"{value:g}" for value in values) + UNITS.get(item.subtype, "")
 
 

@@ -61,7 +61,11 @@ def folder(core, tmp_path, monkeypatch):
     rigged = add_object(scan)
     for name, members in (("Arm", scan[:, 0] > 0.0), ("Leg", scan[:, 0] <= 0.0)):
         add_group(rigged, name, members)
+    rigged.parent = add_armature(
+        {"Arm": ((0.0, 0.0, 0.0), (0.8, 0.0, 0.0)), "Leg": ((0.0, 0.0, 0.0), (-0.8, 0.0, 0.0))}
+    )
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "rigged.blend"), copy=True)
+    new_file()
     bar = bar_splats(core)
     small = replace(bar, positions=np.float32(0.4 * bar.positions), scales=np.float32(0.4 * bar.scales))
     for name in ("guitar", "a", "b"):
