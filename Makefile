@@ -8,7 +8,7 @@ BOOT := $(shell for python in "$(PYTHON)" python3.11 python3.13 python3 python "
 	"$$python" -c "import sys; sys.exit(sys.version_info < (3, 8))" >/dev/null 2>&1 && echo "$$python" && break; done)
 run = $(if $(BOOT),"$(BOOT)",$(error No Python is found: install Python 3.11 or 3.13, or name it by PYTHON=...)) -B scripts/
 
-.PHONY: help demo test test-all test-gui build validate audit lint benchmark index pictures clean
+.PHONY: help demo test test-all test-gui build wheel validate audit lint benchmark index pictures clean
 
 help: ## Show this list (default)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-12s%s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -27,6 +27,9 @@ test-gui: ## Test with real keys and mouse in a Blender window, prepared once: s
 
 build: ## Build one zip per platform into dist/
 	@$(run)package.py
+
+wheel: ## Build the wheel for scripts without Blender into dist/
+	@$(run)environments.py wheel -m hatchling build -t wheel -d dist
 
 validate: ## Build, and run Blender's validator on every zip
 	@$(run)package.py --validate

@@ -92,7 +92,7 @@ def stage(platforms):
     for name in PACKAGE:
         source = ROOT / name
         if source.is_dir():
-            shutil.copytree(source, STAGE / name, ignore=shutil.ignore_patterns("__pycache__", ".*"))
+            shutil.copytree(source, STAGE / name, ignore=shutil.ignore_patterns("__pycache__", ".*", "py.typed"))
         elif source.exists():
             shutil.copy2(source, STAGE / name)
         else:

@@ -1,4 +1,4 @@
-"""Run the tests: core without Blender, the installed extension in Blender's module, and in a window with real keys.
+"""Run the tests: core without Blender, the wheel, the extension in Blender's module, and in a window with real keys.
 
 As many suites run side by side as there are processors, while this program makes the environments of the next ones;
 each but the window's in four parts, of every fourth file, so that no processor waits long for the last. What pytest
@@ -169,6 +169,8 @@ def main():
         threads = {name: {"OPENBLAS_NUM_THREADS": None} for name in list(cores)[-1:] if options.all}
         for name, python in cores.items():
             suites.start_folder(name, python, "tests/core", **threads.get(name, {}))
+        for version, python in found:
+            suites.start(f"wheel-{version}", ensure(f"wheel-{version}", "wheel", python), "tests/wheel")
         package.build([package.this_platform()])
         if options.gui or options.all:  # the longest: not the last
             start_gui(suites, required=options.gui)

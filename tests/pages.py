@@ -79,10 +79,12 @@ def _lines(commands):
 
 
 def _kind(text):
-    """What is typed: make, blender, python or pip in a shell, json, or Python with core or with bpy."""
+    """What is typed: make, blender, python or pip in a shell, json, or Python with core, the wheel, or bpy."""
     command = re.match(_SHELL, text)
     if command:
         return command[1]
     if text.startswith("{"):
         return "json"
+    if re.search(r"^(from|import) meshfree_laplacian\b", text, re.MULTILINE):
+        return "wheel"
     return "core" if re.search(r"^(from|import) core\b", text, re.MULTILINE) else "bpy"

@@ -13,7 +13,7 @@ from benchmarks.samplings import fibonacci_sphere
 from tests.pages import NOT_RUN, ROOT, snippets, typed
 
 MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
-RUN = {"core", "make", "bpy", "blender", "json"}  # the last three by tests/blender/test_pages.py
+RUN = {"core", "make", "bpy", "blender", "json", "wheel"}  # by tests/blender/test_pages.py, and tests/wheel
 
 
 def by_name(kind):

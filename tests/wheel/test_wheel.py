@@ -1,0 +1,96 @@
+"""The wheel in an environment of its own: what is in it, its example, files, types, and the code of the README."""
+
+import re
+import subprocess
+import sys
+import tomllib
+import zipfile
+
+import pytest
+
+from tests.wheel.conftest import ROOT, call, program, site
+
+NAME = "meshfree_laplacian"
+
+
+def python(folder, code, cwd, *arguments):
+    """What some code prints in an environment."""
+    return call(program(folder, "python"), "-c", code, *arguments, cwd=cwd)
+
+
+def test_it_holds_the_packages_in_the_tree_and_nothing_else(wheel):
+    def sources(folder, ending):
+        found = (path.relative_to(ROOT / folder) for path in (ROOT / folder).rglob(ending))
+        return {path.as_posix() for path in found if "__pycache__" not in path.parts}
+
+    wanted = {f"{NAME}/{path}" for ending in ("*.py", "*.pyi", "py.typed") for path in sources("core", ending)}
+    with zipfile.ZipFile(wheel) as packed:
+        assert {name for name in packed.namelist() if ".dist-info/" not in name} == wanted
+
+
+def test_it_has_the_version_of_the_extension(wheel):
+    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
+    assert wheel.name == f"{NAME}-{manifest['version']}-py3-none-any.whl"
+
+
+def test_it_asks_for_numpy_and_scipy_only(bare, tmp_path):
+    """But for files that need more, it says what is missing."""
+    code = (
+        f"from pathlib import Path; import {NAME} as mf; print(mf.build_laplacian(mf.example_sphere()).areas.sum())\n"
+        "Path('a.las').write_bytes(b'LASF')\n"
+        "try: mf.files.read_points(Path('a.las'))\n"
+        "except mf.PointCloudError as error: print(error)"
+    )
+    area, error, *_ = python(bare, code, tmp_path).splitlines()
+    assert float(area) == pytest.approx(12.566, rel=1e-3)
+    assert "laspy" in error
+
+
+def test_it_reads_and_writes_files(place, tmp_path):
+    code = f"""
+import laspy, numpy as np
+from pathlib import Path
+import {NAME} as mf
+points = mf.example_sphere()
+header = laspy.LasHeader(point_format=6, version="1.4")
+header.scales = [1e-7] * 3
+las = laspy.LasData(header)
+las.xyz = points
+las.write("a.laz")
+table = mf.files.read_points(Path("a.laz"))
+mf.files.write_points(Path("b.ply"), table)
+print(np.abs(mf.files.read_points(Path("b.ply")).points - points).max() < 1e-6)
+"""
+    assert python(place, code, tmp_path) == "True\n"
+
+
+USER = """
+import numpy as np
+
+import meshfree_laplacian as mf
+
+laplacian = mf.build_laplacian(np.zeros((5, 3)), options=mf.LaplacianOptions(neighbors=6))
+count: int = len(laplacian.eigenpairs(3).eigenvalues)
+mf.LaplacianOptions(neighbours=6)
+areas: str = laplacian.areas
+"""
+WRONG = {8: "call-arg", 9: "assignment"}  # lines of it, and what mypy calls their mistakes
+
+
+def test_type_checkers_know_its_calls(place, tmp_path):
+    (tmp_path / "user.py").write_text(USER)
+    checked = [sys.executable, "-m", "mypy", "--strict", "--python-executable", program(place, "python"), "user.py"]
+    done = subprocess.run(list(map(str, checked)), cwd=tmp_path, capture_output=True, text=True)
+    found = re.findall(r"^user\.py:(\d+): error: .*\[([\w-]+)\]$", done.stdout, re.MULTILINE)
+    assert {int(line): kind for line, kind in found} == WRONG, done.stdout + done.stderr
+
+
+def test_the_readme_leads_from_a_cloud_to_a_picture(place, tmp_path):
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    [code] = [one for one in re.findall(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL) if NAME in one]
+    assert len(code.strip().splitlines()) <= 20
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs" / "coral.ply").symlink_to(ROOT / "docs" / "coral.ply")
+    printed = call(sys.executable, "-c", code, cwd=tmp_path, env={"PYTHONPATH": str(site(place)), "MPLBACKEND": "agg"})
+    assert printed.startswith("area ")
+    assert (tmp_path / "coral.png").read_bytes().startswith(b"\x89PNG")
