@@ -3,10 +3,10 @@
 import bpy
 from bpy.props import BoolProperty, FloatProperty, StringProperty
 
+from ..command.quantities import quantity
 from ..operators.objects.all_or_nothing import all_or_nothing
 from ..operators.objects.color_choices import COLOR_CHOICES, color_choice
 from ..operators.objects.colors import own_material
-from ..operators.objects.quantities import quantity
 from ..operators.registration import Registration, Row
 from ..operators.running.ready import ReadyOperator, reporting
 from .display import find_display, is_colored

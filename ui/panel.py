@@ -2,12 +2,12 @@
 
 import bpy
 
+from ..command.quantities import APPLICATIONS, DEVIATION, RESULTS, eigenvector_name, quantity
 from ..operators import registration
 from ..operators.deform.binding import handled_object
-from ..operators.objects.attributes import DISC, eigenvector_name, mode_number, point_count
+from ..operators.objects.attributes import DISC, mode_number, point_count
 from ..operators.objects.colors import own_colors, own_material, shows_own_material
 from ..operators.objects.modifiers import has_input, input_property, is_own, is_sequence
-from ..operators.objects.quantities import APPLICATIONS, DEVIATION, RESULTS, quantity
 from ..operators.objects.reading import TYPES, obstacle, sharing_objects
 from ..operators.objects.result import area_text, is_analyzed, is_stale, is_trusted, read_eigenvalues
 from ..operators.objects.splats import LEFT_BEHIND, are_left_behind, has_splats

@@ -9,5 +9,5 @@ from .mesh import MESHES, write_mesh
 from .origin import choose_origin, is_coarse
 from .ply import PlyVertices, read_elements, read_vertex_columns, read_vertex_names, write_vertex_columns
 from .rows import unpacks_too_far
-from .table import FARTHEST, PointTable, check_places, unit_colors
+from .table import FARTHEST, SCANNER, PointTable, check_places, split_columns, unit_colors
 from .whole import replacing

@@ -4,13 +4,13 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, IntProperty
 
+from ...command.quantities import DISPLACEMENT
 from ...core import NotEnoughMemoryError, PointCloudError
 from ...core.memory import available_memory
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.animation import TRANSFORM
 from ..objects.attributes import point_count, read_attribute, write_attribute
 from ..objects.carried import carried, carries, moved_names
-from ..objects.quantities import DISPLACEMENT
 from ..objects.reading import find_object
 from ..objects.splats import HARMONIC, harmonic_names
 from ..registration import Registration, Row

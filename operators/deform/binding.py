@@ -13,6 +13,7 @@ import bpy
 import numpy as np
 
 from ... import core
+from ...command.quantities import DISPLACEMENT
 from ...core import LaplacianOptions, PointCloudError
 from ..objects.attributes import (
     REST,
@@ -27,7 +28,6 @@ from ..objects.counting import members, weighted_checksum
 from ..objects.groups import ANCHOR, chosen_weights, handle_names, is_chosen
 from ..objects.handlers import notify
 from ..objects.options import laplacian_options, settings_values
-from ..objects.quantities import DISPLACEMENT
 from ..objects.reading import TYPES, boundary_points, fingerprint, sharing_objects
 from ..objects.splats import has_splats, read_splats
 from ..running import cache

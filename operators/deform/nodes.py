@@ -2,11 +2,11 @@
 
 import bpy
 
+from ...command.quantities import DISPLACEMENT
 from ..objects.attributes import DISC, REST
 from ..objects.carried import carried
 from ..objects.modifiers import DEFORM_TAG, SHAPE_TAG, is_deform, is_display, is_intact, new_group, set_input
 from ..objects.node_trees import TreeBuilder
-from ..objects.quantities import DISPLACEMENT
 
 NAME = "Mesh-Free Deform"
 VALUE = "Value"  # input of the nodes of a stored deformation

@@ -11,10 +11,10 @@ import bmesh
 import bpy
 import numpy as np
 
+from ...command.quantities import DISPLACEMENT
 from ...core import PointCloudError
 from ..objects.attributes import in_edit_mesh, point_count, positions_now, tag_changed, write_attribute
 from ..objects.carried import carries, write_moved
-from ..objects.quantities import DISPLACEMENT
 
 POSE = "lb_pose"  # custom property of the mesh: the pose of the displacements
 

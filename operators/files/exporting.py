@@ -8,6 +8,9 @@ from bpy.props import BoolProperty, EnumProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ... import core
+from ...command import analysis
+from ...command.clouds import save_arrays
+from ...command.rows import write_rows, write_text
 from ...core import PointCloudError
 from ...core.files import replacing, write_points
 from ..objects.options import laplacian_options
@@ -22,8 +25,7 @@ from ..running.application import build_operator
 from ..running.job import JobOperator
 from ..running.ready import reporting
 from ..tools.splats import SplatOperator
-from .objects import analysis_arrays, file_filter, point_table, save_arrays
-from .rows import write_rows, write_text
+from .objects import file_filter, point_table
 from .splats import splats_in_world, splats_to_write
 from .svg import profile_picture
 
@@ -168,7 +170,7 @@ class MESHFREE_OT_export_operator(ExportOperator, bpy.types.Operator):
             built = build_operator(reading, options, progress)
             spectrum = cache.lowest_modes(built.laplacian, count, progress) if count else None
             progress("Write", 1.0)
-            save_arrays(path, analysis_arrays(place, built, spectrum))
+            save_arrays(path, analysis.arrays(place, built, spectrum))
             return f"{name}: {built.laplacian.stiffness.nnz:,} weights and {count} modes written to {path.name}"
 
         return write

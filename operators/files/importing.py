@@ -10,6 +10,7 @@ from bpy.props import BoolProperty, CollectionProperty, EnumProperty, StringProp
 from bpy_extras.io_utils import ImportHelper
 
 from ... import core
+from ...command.clouds import read_file
 from ...core import PointCloudError
 from ...core.files import (
     READABLE,
@@ -34,7 +35,7 @@ from ..running import cache
 from ..running.job import JobOperator
 from ..running.ready import reporting
 from .columns import column_notices
-from .objects import add_object, file_filter, read_file
+from .objects import add_object, file_filter
 from .sequence import add_sequence
 from .splats import add_splats, is_drawn, mark
 

@@ -4,6 +4,8 @@ import bpy
 import numpy as np
 
 from ... import core
+from ...command.rows import TABLES, write_rows, write_text
+from ...command.settings import as_place, place
 from ...core import PointCloudError
 from ...core.files import replacing
 from ..objects.place import place_of
@@ -12,8 +14,6 @@ from ..tools.profile import Profile
 from ..tools.sections import CrossSection
 from . import objects as files
 from . import opening
-from .arguments import as_place, place
-from .rows import TABLES, write_rows, write_text
 from .svg import profile_picture
 from .verbs import LEFT_OUT, Apply
 

@@ -4,33 +4,28 @@ import bpy
 import numpy as np
 from bpy.props import StringProperty
 
-from ... import core
+from ...command.quantities import NORMAL, PREFIX
 from ...core import PointCloudError
 from ...core.files import (
     READABLE,
     SPLATS,
     WRITABLE,
-    LasChoices,
     PointTable,
     choose_origin,
     is_coarse,
-    read_points,
-    replacing,
     split_digits,
 )
 from ...core.files.table import NORMAL as FILE_NORMAL
 from ...core.files.table import SCANNER
-from ..objects.attributes import ONLY_DRAWN, PREFIX, STORABLE, own_positions, read_attribute, type_of, write_attribute
+from ..objects.attributes import ONLY_DRAWN, STORABLE, own_positions, read_attribute, type_of, write_attribute
 from ..objects.colors import COLOR, own_colors
 from ..objects.groups import add_group, has_group
 from ..objects.place import OFFSET, place_of
-from ..objects.quantities import NORMAL, rows_of
 from ..objects.reading import seen_positions
 from .columns import RENAMED, Column, doubted_columns, known_digits, read_columns, remember_columns
 
 INPUTS = (*READABLE, *SPLATS, ".blend")
 OUTPUTS = (".blend", *WRITABLE, ".npz")
-_ALL = LasChoices()
 _LONGEST_NAME = 60  # bytes; Blender's own limit is little above
 _PART = 5  # of them for the suffix of the second part of a column
 
@@ -43,26 +38,6 @@ def file_filter(*suffixes):
         default=";".join(f"*{suffix}" for suffix in suffixes),
         options={"HIDDEN"},
     )
-
-
-def read_file(path, columns="", las=_ALL):
-    """Read a file, as splats if it holds splats.
-
-    Parameters
-    ----------
-    path : pathlib.Path
-    columns : str
-        Names of the columns of a file of text; empty to find them.
-    las : LasChoices
-        Which points of LAS files are read.
-
-    Returns
-    -------
-    Splats or PointTable
-    """
-    if columns.strip():
-        return read_points(path, columns)
-    return core.splats.read_file(path, lambda path: read_points(path, las=las))
 
 
 def add_object(name, table, collection, known=None, with_attributes=True):
@@ -247,39 +222,6 @@ def faces_of(obj):
     return [
         corners[starts[counts == count, None] + np.arange(count)][:, ::order] for count in np.unique(counts).tolist()
     ]
-
-
-def save_arrays(path, arrays):
-    """Write arrays by name; an older file is kept if that fails."""
-    with replacing(path) as part, part.open("wb") as file:  # to a path, numpy would add its own ending
-        np.savez(file, **arrays)
-
-
-def analysis_arrays(place, built, spectrum) -> dict:
-    """Return all arrays of an analysis, in double precision, in lengths and axes of the world.
-
-    Those of the stiffness matrix have the names of scipy.sparse.save_npz, so that scipy.sparse.load_npz reads it.
-
-    Parameters
-    ----------
-    place : ndarray, (3,)
-        Of the object, by `place_of`.
-    built : Built
-    spectrum : Spectrum or None
-    """
-    laplacian, stiffness = built.laplacian, built.laplacian.stiffness
-    return {
-        "points": laplacian.points + place,
-        **{row.source.rpartition(".")[2]: row.of(built) for row in rows_of("analyze")},
-        "smoothing_lengths": laplacian.smoothing_lengths,
-        "eigenvalues": np.empty(0) if spectrum is None else spectrum.eigenvalues,
-        "eigenvectors": np.empty((len(laplacian.areas), 0)) if spectrum is None else spectrum.eigenvectors,
-        "format": np.array(b"csr"),
-        "shape": np.array(stiffness.shape),
-        "data": stiffness.data,
-        "indices": stiffness.indices,
-        "indptr": stiffness.indptr,
-    }
 
 
 def file_points(obj):

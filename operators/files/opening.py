@@ -3,15 +3,16 @@
 import bpy
 
 from ... import core
+from ...command.clouds import read_file, save_arrays
+from ...command.quantities import APPLICATIONS, MEAN_CURVATURE
 from ...core import PointCloudError
 from ...core.files import WRITABLE, PointTable, write_points
 from ..objects.colors import own_colors
 from ..objects.handlers import notify
-from ..objects.quantities import APPLICATIONS, MEAN_CURVATURE
 from ..objects.reading import TYPES
 from ..objects.splats import has_splats
 from .columns import column_notices
-from .objects import add_object, point_table, read_file, save_arrays
+from .objects import add_object, point_table
 from .splats import add_splats, splats_to_write, with_results
 
 

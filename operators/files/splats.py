@@ -6,9 +6,10 @@ import bpy
 import numpy as np
 
 from ... import core
+from ...command.clouds import with_columns
+from ...command.quantities import PREFIX
 from ...core.files import choose_origin
-from ...core.files.table import split_columns
-from ..objects.attributes import ONLY_DRAWN, PREFIX, STORABLE, read_attribute, write_attribute
+from ..objects.attributes import ONLY_DRAWN, STORABLE, read_attribute, write_attribute
 from ..objects.place import OFFSET, place_of
 from ..objects.splat_file import (
     OWN_OFFSET,
@@ -160,8 +161,9 @@ def _with_file(obj):
 
 def with_results(splats, data):
     """Return splats to be written with the results of their points as further columns of the file."""
-    columns = {} if splats.file is None else dict(splats.file.columns)
-    for layer in data.attributes:
-        if layer.name.startswith(PREFIX) and layer.name not in ONLY_DRAWN and layer.data_type in STORABLE:
-            columns.update(split_columns(layer.name, read_attribute(data, layer.name)))
-    return replace(splats, file=(splats.file or core.splats.SplatFile({}))._replace(columns=columns))
+    names = [
+        layer.name
+        for layer in data.attributes
+        if layer.name.startswith(PREFIX) and layer.name not in ONLY_DRAWN and layer.data_type in STORABLE
+    ]
+    return with_columns(splats, {name: read_attribute(data, name) for name in names})

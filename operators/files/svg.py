@@ -5,8 +5,8 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
+from ...command.quantities import quantity
 from ...core import PointCloudError
-from ..objects.quantities import quantity
 from ..objects.ticks import round_ticks, tick_texts
 from ..objects.units import attribute_power, unit
 

@@ -6,6 +6,8 @@ import bpy
 import numpy as np
 
 from ... import core
+from ...command import alignment
+from ...command.settings import as_place, place
 from ...core.files import MESHES, READABLE, read_points, write_mesh
 from ..objects.attributes import point_count
 from ..objects.groups import assign
@@ -21,7 +23,6 @@ from ..tools.orient import OrientNormals
 from ..tools.simulate import Simulate
 from . import objects as files
 from . import opening
-from .arguments import as_place, place
 from .verbs import LEFT_OUT, Apply
 
 _PLACES = "--at"  # group of the points nearest to given positions
@@ -212,12 +213,7 @@ class AlignWith(WithReference):
 
     def figures(self, tool, result):
         found, *_ = result
-        return {
-            "converged": found.converged,
-            "overlap": found.overlap,
-            "median_residual": float(np.quantile(found.residual, 0.5 * found.overlap)),
-            "matrix": tool.in_file(found.matrix).tolist(),
-        }
+        return alignment.figures(found, tool.reference.place)
 
 
 class _Reference:
@@ -258,12 +254,6 @@ class _AlignWithFile(_MovedLast, Align):
 
     def other(self, context, obj):
         return self.reference.name, self.reference.reading.points, place_of(obj) - self.reference.place, None
-
-    def in_file(self, matrix):
-        """Return a matrix between points as read as one between coordinates of the files."""
-        there, back = np.eye(4), np.eye(4)
-        there[:3, 3], back[:3, 3] = self.reference.place, -self.reference.place
-        return there @ matrix @ back
 
 
 class Orient(Apply):

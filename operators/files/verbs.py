@@ -4,6 +4,10 @@ from functools import partial
 
 import bpy
 
+from ...command import analysis, verbs
+from ...command.clouds import read_file
+from ...command.settings import add_setting, chosen
+from ...command.verb import Verb
 from ...core import PointCloudError
 from ...core.files import LasChoices, parse_classes
 from ..objects import options
@@ -14,13 +18,12 @@ from ..objects.reading import obstacle, sharing_objects
 from ..objects.result import analysis_names, check_writable, write_result
 from ..running.application import compute_all
 from ..running.stages import Stages
-from ..tools.analyze import WRITE_LIMIT, plan_analysis
+from ..tools.analyze import plan_analysis
 from ..tools.sequence import continue_modes
 from . import objects as files
 from . import opening
-from .arguments import add_setting
+from .arguments import as_setting
 
-ONE_LINE = "Writes one JSON line per input, with notices, or the error. The exit code is 1 if any input failed."
 _SETTINGS = (*options.ALL_NAMES, "make_single_user")  # of the object
 LEFT_OUT = {
     "rna_type",
@@ -31,32 +34,6 @@ LEFT_OUT = {
     "animate",
     "period",
 }  # of an operator: points are moved in place
-
-
-class Verb:
-    """A command for files. A new one is made for each command line, and may keep what its files share.
-
-    A subclass has methods `run`, and `add_options` for its options.
-    """
-
-    name = help = description = ""  # on the command line, help in one line, and in full
-    inputs = "files"
-    outputs = ()  # endings of its output files, the first one by default in folders; empty for no output
-    reads = ()  # options with other input files, which are never overwritten
-
-    def add_options(self, parser):
-        """Add options beside inputs and outputs."""
-
-    def check(self, parser, arguments):
-        """Refuse incompatible options, by `parser.error`."""
-
-    def beside(self, output, arguments) -> list:
-        """Return the paths of further files that are written beside an output."""
-        return []
-
-    def run(self, path, arguments, output) -> dict:
-        """Process one file, write the output unless it is None, and return what to print."""
-        raise NotImplementedError
 
 
 class ObjectVerb(Verb):
@@ -88,7 +65,7 @@ class ObjectVerb(Verb):
         parser.add_argument("--withheld", action="store_true", help="read points of LAS files, too, that are withheld")
         settings = bpy.types.Object.bl_rna.properties["meshfree"].fixed_type.properties
         for name in _SETTINGS:
-            add_setting(parser, settings[name])
+            add_setting(parser, as_setting(settings[name]))
 
     def run(self, path, arguments, output):
         obj, notices = self.open(path, "object", arguments)
@@ -99,7 +76,7 @@ class ObjectVerb(Verb):
         """Open a file in place of the loaded one; return the object named by an option, with settings, and notices."""
         columns = arguments.columns if option == "object" else ""
         las = LasChoices(parse_classes(arguments.classes), arguments.withheld)
-        read = partial(files.read_file, columns=columns, las=las)
+        read = partial(read_file, columns=columns, las=las)
         obj, notices = opening.load(path, getattr(arguments, option), f"--{option.replace('_', '-')}", read)
         reason = obstacle(obj)
         if reason:
@@ -136,58 +113,41 @@ class Analyze(ObjectVerb):
         self._earlier = None  # modes and points of the frame before
 
     def add_options(self, parser):
-        parser.add_argument("--modes", type=int, default=0, metavar="N", help="how many vibration modes to compute")
-        parser.add_argument(
-            "--write-limit", type=int, default=WRITE_LIMIT, metavar="N", help="modes written as attributes at most"
-        )
-        parser.add_argument(
-            "--sequence",
-            action="store_true",
-            help="the inputs are frames in their order: each mode continues one of the frame before, with its sign, so"
-            " that eigenvalues need not ascend; overlaps of the two are written, too",
-        )
+        for setting in verbs.Analyze.settings:
+            add_setting(parser, setting)
+        parser.add_argument("--sequence", action="store_true", help=verbs.SEQUENCE)
         super().add_options(parser)
 
     def check(self, parser, arguments):
-        if arguments.modes < 0 or arguments.write_limit < 1:
-            parser.error("--modes takes a number of at least 0, --write-limit one of at least 1")
-        if arguments.sequence and not arguments.modes:
-            parser.error("--sequence matches modes: give --modes, too")
+        vars(arguments).update(chosen(verbs.Analyze.settings, arguments))
+        verbs.check_sequence(parser, arguments, arguments.modes)
 
     def work(self, obj, path, arguments, output):
         check_writable(obj, analysis_names(min(arguments.modes, arguments.write_limit)), obj.meshfree.make_single_user)
         with Stages(bpy.context.window_manager, self.operator.name) as stages:
-            analysis = plan_analysis(bpy.context, obj, arguments.modes, arguments.write_limit)(stages)
+            found = plan_analysis(bpy.context, obj, arguments.modes, arguments.write_limit)(stages)
         matched = {}
         if arguments.sequence:
-            analysis, overlaps, self._earlier = continue_modes(analysis, files.file_points(obj), self._earlier)
+            found, overlaps, self._earlier = continue_modes(found, files.file_points(obj), self._earlier)
             matched["overlaps"] = overlaps.tolist()
         if sharing_objects(obj):  # make_single_user is on, as checked
             obj.data = obj.data.copy()
-        write_result(obj, analysis, arguments.write_limit)
-        renew(obj, self.operator.name, analysis.notices)
-        written = [] if output is None else opening.save(output, obj, _arrays(obj, analysis))
+        write_result(obj, found, arguments.write_limit)
+        renew(obj, self.operator.name, found.notices)
+        written = [] if output is None else opening.save(output, obj, _arrays(obj, found))
         return {
-            "points": point_count(obj.data),
-            "total_area": analysis.total_area,
-            "trusted_area": analysis.trusted_area,
-            **analysis.counts,
-            "eigenvalues": [] if analysis.spectrum is None else analysis.spectrum.eigenvalues.tolist(),
+            **analysis.figures(found.measures, found.spectrum),
             **matched,
-            "seconds": _rounded(analysis.seconds),
-            "notices": [*analysis.notices, *written],
+            "seconds": stages.rounded,
+            "notices": [*found.notices, *written],
         }
 
 
-def _arrays(obj, analysis):
+def _arrays(obj, found):
     """Return the arrays of an analysis by name; of a subset those transferred to all points, without an operator."""
-    if analysis.subset_count:
+    if found.subset_count:
         return files.attribute_arrays(obj)
-    return files.analysis_arrays(place_of(obj), analysis.built, analysis.spectrum)
-
-
-def _rounded(seconds):
-    return {name: round(spent, 3) for name, spent in seconds.items()}
+    return analysis.arrays(place_of(obj), found.built, found.spectrum)
 
 
 class Apply(ObjectVerb):
@@ -204,7 +164,7 @@ class Apply(ObjectVerb):
 
     def add_options(self, parser):
         for setting in self._choices:
-            add_setting(parser, setting)
+            add_setting(parser, as_setting(setting))
         super().add_options(parser)
 
     def tool_of(self, obj, arguments):
@@ -230,7 +190,7 @@ class Apply(ObjectVerb):
             "points": point_count(obj.data),
             "done": line,
             **figures,
-            "seconds": _rounded(stages.seconds),
+            "seconds": stages.rounded,
             "notices": [*notices, *written],
         }
 

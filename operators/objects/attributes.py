@@ -6,8 +6,8 @@ import bmesh
 import bpy
 import numpy as np
 
+from ...command.quantities import AREA, EIGENVECTOR, ORIENTATION, quantity
 from ...core import PointCloudError
-from .quantities import AREA, EIGENVECTOR, quantity
 
 
 class _Storage(NamedTuple):
@@ -31,8 +31,6 @@ _FOUR = {  # types that are stored, but cannot be shown as results
 _LAYERS = {"FLOAT": "float", "FLOAT_VECTOR": "float_vector", "INT": "int", "BOOLEAN": "bool"}  # in Edit Mode
 
 SELECTION = ".selection"  # of point clouds, as Blender names it
-PREFIX = "lb_"
-ORIENTATION = "lb_orientation"  # vectors that orient the normals, where a user chose a side
 DISC = "lb_disc"  # unit normal times the radius of the disc of the point, in units of the spacing
 # Gradients of the displayed values, or of both texture coordinates, and these values. Blender hides such names.
 SLOPE, SLOPE_2, SLOPE_OF = ".lb_slope", ".lb_slope_2", ".lb_slope_of"
@@ -60,11 +58,6 @@ def type_of(name: str) -> str:
     if row.attribute:
         return row.data_type
     return "FLOAT_VECTOR" if name.startswith(SPLAT_HARMONIC) else _TYPES.get(name, "FLOAT")
-
-
-def eigenvector_name(mode: int) -> str:
-    """Name of the attribute that holds a mode; modes are counted from 1."""
-    return f"{EIGENVECTOR}{mode:03d}"
 
 
 def mode_number(name: str) -> int:

@@ -7,11 +7,11 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
+from ...command.quantities import MOTION
 from ...core import PointCloudError
 from .attributes import in_edit_mesh, point_count, tag_changed, write_attribute
 from .handlers import add_handlers, notify, remove_handlers
 from .notices import keep
-from .quantities import MOTION
 
 TOOL = "Simulate Along Surface"  # whose notices these are
 _DTYPE = np.dtype("<f4")

@@ -5,11 +5,11 @@ from typing import NamedTuple
 import bpy
 import numpy as np
 
+from ...command.quantities import MOTION, MOTION_MODE, NORMAL
 from .animation import curves
 from .attributes import remove_numbered, write_attribute
 from .modifiers import MOTION_TAG, is_display, is_motion, new_group, set_input
 from .node_trees import TreeBuilder
-from .quantities import MOTION, MOTION_MODE, NORMAL
 from .reading import metric
 
 NAME = "Mesh-Free Motion"

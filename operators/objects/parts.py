@@ -1,42 +1,12 @@
 """The table of measures of an object's parts, kept with its settings."""
 
 from math import isfinite, nan
-from typing import NamedTuple
 
 import bpy
 from bpy.props import BoolProperty, FloatProperty, IntProperty
 
+from ...command.measures import PartRow
 from .reading import fingerprint, metric
-
-
-class PartRow(NamedTuple):
-    """Measures of a part, in world lengths; NaN for what there is not.
-
-    Attributes
-    ----------
-    name : str
-        Such as "Component 0".
-    points : int
-    area, boundary_length, volume : float
-        With their uncertainties; volumes only of closed components.
-    mean, root_mean_square : float
-        Of an attribute, by area.
-    """
-
-    name: str
-    points: int
-    area: float
-    area_uncertainty: float
-    boundary_length: float
-    length_uncertainty: float
-    volume: float = nan
-    volume_uncertainty: float = nan
-    mean: float = nan
-    root_mean_square: float = nan
-
-    def record(self) -> dict:
-        """Return the numbers by name, None for what there is not."""
-        return {name: None if value != value else value for name, value in self._asdict().items()}
 
 
 class MESHFREE_PG_part(bpy.types.PropertyGroup):

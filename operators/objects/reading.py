@@ -7,8 +7,9 @@ import bpy
 import numpy as np
 
 from ... import core
+from ...command.quantities import ORIENTATION
 from ...core import PointCloudError
-from .attributes import CORNER, ORIENTATION, has_vectors, own_positions, point_count, read_attribute
+from .attributes import CORNER, has_vectors, own_positions, point_count, read_attribute
 from .counting import members
 from .evaluated import evaluated_positions
 from .groups import chosen_members

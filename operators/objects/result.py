@@ -5,19 +5,18 @@ import zlib
 import bpy
 import numpy as np
 
+from ...command.quantities import AREA, EIGENVECTOR, NORMAL, RESULTS, eigenvector_name
 from ...core import PointCloudError
 from .attributes import (
     ORIENTATION,
     check_names,
     check_size,
-    eigenvector_name,
     point_count,
     remove_numbered,
     tag_changed,
     write_attribute,
 )
 from .options import point_budget, settings_values
-from .quantities import AREA, EIGENVECTOR, NORMAL, RESULTS
 from .reading import chosen_sides, fingerprint, metric, sharing_objects
 
 _DIGITS = 3  # that scans justify

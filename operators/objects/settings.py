@@ -12,10 +12,10 @@ from bpy.props import (
     StringProperty,
 )
 
+from ...command.settings import LAPLACIAN
 from . import deform_settings, notices, parts
 from .color_choices import color_choice
 from .handlers import notify
-from .options import DEFAULTS, PAPER_DEFAULTS
 
 
 def _recolor(settings, context):
@@ -60,103 +60,84 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     # What results depend on. Names and defaults are those of core's options.
     laplacian: EnumProperty(
         name="Method",
-        description="How the Laplacian is built",
         items=(
             ("DEFAULT", "Default", "For scans: adaptive bandwidths, with corrections for curvature and boundary"),
             ("PAPER", "Paper", "As in the paper: one bandwidth for all points, no boundary, no corrections"),
         ),
-        default="DEFAULT",
+        **LAPLACIAN["laplacian"].keywords,
     )
     bandwidth: EnumProperty(
         name="Bandwidth",
-        description="How the radius of the kernel is chosen at each point",
         items=(
             ("ADAPTIVE", "Adaptive", "By the widest gaps between the points around it"),
             ("LOCAL", "Local", "By the spacing of the points alone"),
             ("GLOBAL", "Global", "The same for all points: for even samples"),
         ),
-        default=DEFAULTS.bandwidth.upper(),
+        **LAPLACIAN["bandwidth"].keywords,
     )
     neighbors: IntProperty(
         name="Neighbors",
-        description="With Local and Global, the smoothing length follows the distance to this neighbor. There must be"
-        " more points than that",
-        default=DEFAULTS.neighbors,
-        min=6,
         soft_max=200,
+        **LAPLACIAN["neighbors"].keywords,
     )
     bandwidth_factor: FloatProperty(
         name="Bandwidth Factor",
-        description="Smoothing length as a multiple of the distance to the neighbor above; with Adaptive, as a"
-        " multiple of the length that is chosen",
-        default=DEFAULTS.bandwidth_factor,
-        min=0.05,
         soft_min=0.3,
         soft_max=2.0,
-        max=5.0,
         step=5,
+        **LAPLACIAN["bandwidth_factor"].keywords,
     )
     normals: EnumProperty(
         name="Normals",
-        description="How the normal of a point is estimated from its neighbors",
         items=(
             ("WPCA", "Weighted Plane", "From a plane through the neighbors, near ones counting more"),
             ("PCA", "Plain Plane", "From a plane through the neighbors, all counting alike"),
         ),
-        default=PAPER_DEFAULTS.normals.upper(),
+        **LAPLACIAN["normals"].keywords,
     )
     areas: EnumProperty(
         name="Areas",
-        description="How the area of each point is computed",
         items=(
             ("REGULARIZED", "Regularized", "Least squares with regularization, equation 7 of the paper"),
             ("CONSTRAINED", "Constrained", "The same with positive areas only, equation 8 of the paper"),
             ("UNIFORM", "Uniform", "The mean area for every point: only for even samples"),
         ),
-        default=PAPER_DEFAULTS.areas.upper(),
+        **LAPLACIAN["areas"].keywords,
     )
     regularization: FloatProperty(
         name="Regularization",
-        description="Weight of the regularization of the areas, independent of the object's size",
-        default=PAPER_DEFAULTS.regularization,
-        min=1e-9,
         soft_max=1.0,
         precision=6,
+        **LAPLACIAN["regularization"].keywords,
     )
     boundary: EnumProperty(
         name="Boundary",
-        description="Where the boundary of the surface is, if no Boundary Group is named",
         items=(
             ("AUTO", "Automatic", "Detect the boundary points, and reflect the surface across the boundary"),
             ("OFF", "Off (Closed Surface)", "Treat the surface as closed"),
         ),
-        default=DEFAULTS.boundary.upper(),
+        **LAPLACIAN["boundary"].keywords,
     )
     sheets: BoolProperty(
         name="Keep Close Sheets Apart",
-        description="Never take points of two close sheets as neighbors, such as the two sides of a thin wall",
-        default=DEFAULTS.sheets,
+        **LAPLACIAN["sheets"].keywords,
     )
     projection: EnumProperty(
         name="Noise",
-        description="Whether noise is smoothed within the computation; your points are not moved, but sharp edges count"
-        " as rounded",
         items=(
             ("AUTO", "Automatic", "Smooth if the measured noise requires it"),
             ("OFF", "Off", "Use the points as they are"),
             ("QUADRIC", "Always", "Project each point onto a quadric fitted to its neighbors"),
         ),
-        default=DEFAULTS.projection.upper(),
+        **LAPLACIAN["projection"].keywords,
     )
     denoise: BoolProperty(
         name="Tangent Planes",
-        description="Project each point onto a plane through its neighbors first, against noise; your points are not"
-        " moved",
-        default=PAPER_DEFAULTS.denoise,
+        **LAPLACIAN["denoise"].keywords,
     )
     boundary_group: StringProperty(
         name="Boundary Group",
-        description="Vertex group with the points of the boundary, instead of finding them; weights above 0 count",
+        **LAPLACIAN["boundary_group"].keywords,
     )
     use_modifiers: BoolProperty(
         name="Use Modifiers",
@@ -165,9 +146,7 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     )
     leave_out_floaters: BoolProperty(
         name="Leave Out Floaters",
-        description="Leave Gaussian splats out of the operator that are nearly transparent, huge or isolated; they"
-        " follow the others",
-        default=True,
+        **LAPLACIAN["leave_out_floaters"].keywords,
     )
     point_budget: EnumProperty(
         name="Point Budget",

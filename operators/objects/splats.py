@@ -6,6 +6,7 @@ from itertools import count, takewhile
 import numpy as np
 
 from ... import core
+from ...command.quantities import DISPLACEMENT
 from ...core import PointCloudError
 from .attributes import (
     REST,
@@ -19,7 +20,6 @@ from .attributes import (
     write_own_positions,
 )
 from .modifiers import get_input, is_deform
-from .quantities import DISPLACEMENT
 
 SCALE, ROTATION, BASE, HARMONIC = "scale", "rotation", "radiance:base", "radiance:sh_"
 PLACE = ".splat_place"  # attribute: where a splat was when its ellipsoid was written, up to a common translation

@@ -1,6 +1,6 @@
 """In which unit the numbers of an attribute are written."""
 
-from .quantities import quantity
+from ...command.quantities import quantity
 
 EIGENVALUE_POWER = -2
 _METERS = {

@@ -4,6 +4,7 @@ from contextlib import contextmanager
 
 from bpy.props import BoolProperty
 
+from ...command.analysis import Built
 from ...core import PointCloudError
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import DISC, write_attribute
@@ -217,7 +218,7 @@ def operator_reader(context, obj):
     return reading, operator
 
 
-def build_operator(reading, options, progress) -> cache.Built:
+def build_operator(reading, options, progress) -> Built:
     """Return the operator of an object's points as they were read, with the mean curvature."""
     return cache.build(
         reading.points, options, reading.boundary, progress, orientation=reading.orientation, splats=reading.splats

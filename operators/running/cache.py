@@ -2,9 +2,7 @@
 
 import hashlib
 from collections import OrderedDict
-from dataclasses import asdict, replace
 from threading import Lock
-from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import bpy
@@ -12,19 +10,14 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from ... import core
+from ...command import analysis
+from ...command.analysis import Built
 
 LIMIT = 2 << 30  # bytes: the operator of 100,000 points with 100 modes takes 0.4 GB
 _NONE = np.arange(0)  # no splats are left out
 _kept = OrderedDict()  # value and bytes by key, in the order of last use
 _sources = WeakKeyDictionary()  # key of each operator
 _lock = Lock()  # computations run in threads
-
-
-class Built(NamedTuple):
-    """An operator and the mean curvature computed by it."""
-
-    laplacian: "core.LaplaceBeltrami"
-    mean_curvature: np.ndarray
 
 
 def build(points, options, boundary, progress, orientation=None, splats=None) -> Built:
@@ -46,10 +39,7 @@ def build(points, options, boundary, progress, orientation=None, splats=None) ->
 
     def compute():
         fitting(len(points), options)
-        laplacian = _laplacian(points, options, boundary, out, progress)
-        progress("Curvature", 1.0)
-        laplacian = replace(laplacian, notices=[*floating_notices(out), *laplacian.notices])
-        return Built(laplacian, core.mean_curvature(laplacian))
+        return analysis.build(points, options, boundary, out, progress)
 
     out = floating(splats)
     key = content(points, options, boundary, out)
@@ -57,24 +47,10 @@ def build(points, options, boundary, progress, orientation=None, splats=None) ->
     if orientation is not None:
         key = content(key, orientation)
         plain = built
-        built = fetch(key, lambda: _oriented(plain, orientation))
+        built = fetch(key, lambda: analysis.oriented(plain, orientation))
     with _lock:
         _sources[built.laplacian] = key
     return built
-
-
-def _laplacian(points, options, boundary, out, progress):
-    """Build the operator by the method of the options; the paper's has no boundary."""
-    given = {"left_out": out, "progress": progress}
-    if isinstance(options, core.PaperOptions):
-        return core.paper.build_laplacian(points, **asdict(options), **given)
-    return core.build_laplacian(points, options=options, boundary=boundary, **given)
-
-
-def _oriented(built, orientation):
-    laplacian = built.laplacian.toward(orientation)
-    kept = np.einsum("ij,ij->i", laplacian.normals, built.laplacian.normals) > 0.0
-    return Built(laplacian, np.where(kept, built.mean_curvature, -built.mean_curvature))
 
 
 def holds(points, options, boundary, splats=None) -> bool:
@@ -88,16 +64,6 @@ def floating(splats):
         return _NONE
     key = content("floaters", splats.positions, splats.scales, splats.rotations, splats.opacities)
     return fetch(key, lambda: core.splats.floating_rows(splats))
-
-
-def floating_notices(out):
-    """Return a notice of the splats that were left out, if any."""
-    if not len(out):
-        return []
-    return [
-        f"Floaters left out of the operator (nearly transparent, huge or isolated splats): {len(out):,}. Select"
-        " Floaters selects them. They move with the nearest splats."
-    ]
 
 
 def fitting(count: int, options, modes: int = 0):

@@ -6,6 +6,7 @@ from threading import Event, Thread
 import bpy
 from bpy.app.handlers import persistent
 
+from ...command.stages import StageTimes
 from ...core import Cancelled, PointCloudError
 from ..objects.handlers import add_handlers, notify, remove_handlers
 from ..objects.options import point_budget, settings_values
@@ -13,7 +14,7 @@ from ..objects.reading import find_object, fingerprint, metric, obstacle, read_p
 from ..objects.result import same_lengths
 from ..registration import Registration, Row
 from .ready import ReadyOperator, reporting
-from .stages import Stages, StageTimes
+from .stages import Stages
 
 STOPPED = "Stopped: nothing was changed"  # by the user
 _FIRST = 0.01  # seconds to the first timer event, after the first redraw

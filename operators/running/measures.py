@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ... import core
-from ..objects.quantities import rows_of
+from ...command.analysis import Built, floating_notices
+from ...command.quantities import rows_of
 from . import cache
 
 _ROWS = rows_of("analyze")
@@ -29,7 +30,7 @@ class Measured(NamedTuple):
         Splats that are left out.
     """
 
-    built: cache.Built
+    built: Built
     subset: np.ndarray
     measures: dict
     prolongation: "core.Prolongation | None"
@@ -48,7 +49,7 @@ class Measured(NamedTuple):
             f"Analyzed {len(self.subset):,} of {len(self.prolongation.nearest):,} points, evenly spread over the"
             " surface, and transferred the results to all. The setting Point Budget decides how many."
         )
-        return [notice, *cache.floating_notices(self.left_out), *self.built.laplacian.notices]
+        return [notice, *floating_notices(self.left_out), *self.built.laplacian.notices]
 
 
 def measure(points, options, boundary, budget, modes, progress, orientation=None, splats=None) -> Measured:
@@ -67,7 +68,7 @@ def measure(points, options, boundary, budget, modes, progress, orientation=None
     subset = _subset(points, options, boundary, splats, budget, modes, progress)
     if not len(subset):
         built = cache.build(points, options, boundary, progress, orientation, splats)
-        return Measured(built, subset, {row.attribute: row.of(built) for row in _ROWS}, None, out)
+        return Measured(built, subset, built.measures, None, out)
     chosen = points[subset]
     at_boundary, sides = (None if given is None else given[subset] for given in (boundary, orientation))
     built = cache.build(chosen, options, at_boundary, progress, sides)

@@ -6,10 +6,11 @@ from bpy.props import BoolProperty, FloatProperty
 from mathutils import Matrix
 
 from ... import core
+from ...command.alignment import ALIGN, check_found, doubts, middle
+from ...command.quantities import RESIDUAL
 from ...core import PointCloudError
 from ..objects.attributes import tag_changed, write_attribute
 from ..objects.place import check_movable, move_object, moves_with
-from ..objects.quantities import RESIDUAL
 from ..objects.reading import TYPES, find_object, obstacle, read_points
 from ..objects.result import length_text
 from ..registration import Registration, Row
@@ -54,18 +55,7 @@ class Motion:
         move_object(obj, Matrix(back @ matrix @ read))
 
 
-def check_found(found, name, other):
-    """Refuse an alignment that failed, of objects of these names."""
-    if not found.fits:
-        raise PointCloudError(
-            f'"{name}" could not be aligned with "{other}": {found.reason} In Blender: move it by hand, or align it'
-            " From Selected Points, three to five on each."
-        )
-
-
-def doubts(found):
-    """Return notices of an alignment that was made."""
-    return [*([] if found.converged else [f"Not aligned in every direction. {found.reason}"]), *found.notices]
+ADVICE = "In Blender: move it by hand, or align it From Selected Points, three to five on each."
 
 
 class Align(Tool):
@@ -77,13 +67,10 @@ class Align(Tool):
 
     overlap: FloatProperty(
         name="Overlap",
-        description="Share of the points that have a counterpart in the other cloud, at most",
-        default=1.0,
-        min=0.05,
-        max=1.0,
         subtype="FACTOR",
+        **ALIGN["overlap"].keywords,
     )
-    scale: BoolProperty(name="Scale", description="Change the size, too, by one factor", default=False)
+    scale: BoolProperty(name="Scale", **ALIGN["scale"].keywords)
     from_selected: BoolProperty(
         name="From Selected Points",
         description="Begin where three to five points, selected in Edit Mode on each of both objects, meet each other",
@@ -99,7 +86,7 @@ class Align(Tool):
 
         def compute(progress):
             found = core.align(reading.points + shift, target, **settings, progress=progress)
-            check_found(found, own_name, name)
+            check_found(found, own_name, name, ADVICE)
             return found, motion, name
 
         return compute
@@ -130,9 +117,9 @@ class Align(Tool):
         self._move = lambda: motion.apply(obj, found.matrix)
         write_attribute(obj.data, RESIDUAL, found.residual)
         tag_changed(obj.data)
-        middle = length_text(float(np.quantile(found.residual, 0.5 * found.overlap)))
+        half = length_text(middle(found))
         size = f", scaled by {np.cbrt(np.linalg.det(found.matrix[:3, :3])):.4g}" if self.scale else ""
-        line = f"{obj.name}: {found.overlap:.0%} of the points lie on {name}, half of them within {middle}{size}"
+        line = f"{obj.name}: {found.overlap:.0%} of the points lie on {name}, half of them within {half}{size}"
         return [*doubts(found), line]
 
 

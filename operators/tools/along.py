@@ -5,10 +5,10 @@ import numpy as np
 from bpy.props import FloatProperty, FloatVectorProperty, StringProperty
 
 from ... import core
+from ...command.quantities import CELL, DIRECTION, SIGNED_DISTANCE, UV
 from ...core import PointCloudError
 from ..objects.attributes import tag_changed, write_attribute
 from ..objects.groups import SOURCE
-from ..objects.quantities import CELL, DIRECTION, SIGNED_DISTANCE, UV
 from ..objects.result import length_text
 from ..registration import Registration, Row
 from ..running import cache

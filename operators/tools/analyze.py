@@ -7,26 +7,25 @@ import numpy as np
 from bpy.props import BoolProperty, IntProperty
 
 from ... import core
-from ...core import UnresolvedModesError
+from ...command import analysis
+from ...command.analysis import WRITE_LIMIT, Built
+from ...command.quantities import NORMAL
+from ...command.stages import StageTimes
 from ..objects.attributes import point_count
 from ..objects.options import laplacian_options, point_budget
-from ..objects.quantities import AREA, BOUNDARY, COMPONENT, DOUBT, NORMAL
 from ..objects.reading import read_points
 from ..objects.result import analysis_names, area_text, is_trusted, write_result
 from ..registration import Registration, Row
 from ..running import cache
 from ..running.application import ShownOperator
 from ..running.measures import measure
-from ..running.stages import StageTimes
-
-WRITE_LIMIT = 50  # default number of modes written as attributes: each takes 4 bytes per point in the file
 
 
 @dataclass(frozen=True)
 class Analysis:
     """The results for an object, in world lengths; normals in local space too."""
 
-    built: cache.Built  # on the subset, where there is one
+    built: Built  # on the subset, where there is one
     measures: dict  # by the names of attributes
     local_normals: np.ndarray
     spectrum: "core.Spectrum | None"
@@ -37,22 +36,17 @@ class Analysis:
     @property
     def total_area(self) -> float:
         """Area of the whole surface."""
-        return float(self.measures[AREA].sum())
+        return analysis.total_area(self.measures)
 
     @property
     def trusted_area(self) -> float:
         """Area of its parts whose results are not in doubt."""
-        return float(self.measures[AREA][self.measures[DOUBT] == 0].sum())
+        return analysis.trusted_area(self.measures)
 
     @property
     def counts(self) -> dict:
         """Numbers of components, boundary points and points left out, by the names of the settings that keep them."""
-        component = self.measures[COMPONENT]
-        return {
-            "component_count": int(component.max()) + 1,
-            "boundary_count": int(np.count_nonzero(self.measures[BOUNDARY])),
-            "left_out_count": int(np.count_nonzero(component < 0)),
-        }
+        return analysis.counts(self.measures)
 
 
 def plan_analysis(context, obj, modes: int = 0, write_limit: int = WRITE_LIMIT, orient=None):
@@ -89,13 +83,7 @@ def plan_analysis(context, obj, modes: int = 0, write_limit: int = WRITE_LIMIT, 
 
 def resolved_modes(laplacian, modes, progress):
     """Compute modes, or as many of them as the points resolve, with a notice."""
-    try:
-        return cache.lowest_modes(laplacian, modes, progress), []
-    except UnresolvedModesError as error:
-        if error.resolved == 0:
-            raise
-        notice = f"Only {error.resolved} of {modes} modes were computed: the others are finer than the points resolve."
-        return cache.lowest_modes(laplacian, error.resolved, progress), [notice]
+    return analysis.resolved_modes(modes, lambda count: cache.lowest_modes(laplacian, count, progress))
 
 
 class AnalysisOperator(ShownOperator):

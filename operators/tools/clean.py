@@ -5,10 +5,11 @@ import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from ... import core
+from ...command.cleaning import STRAYS, check_some_stay, stray_line
+from ...command.quantities import COMPONENT, STRAY, quantity
 from ...core import PointCloudError
 from ..objects.attributes import read_attribute, tag_changed, write_attribute
 from ..objects.deleting import check_deletable, keep_points
-from ..objects.quantities import COMPONENT, STRAY, quantity
 from ..objects.reading import read_points
 from ..objects.result import EIGENVALUES, is_analyzed, is_stale
 from ..registration import Registration, Row
@@ -25,26 +26,19 @@ class StraySettings:
 
     strictness: FloatProperty(
         name="Strictness",
-        description="How near to the surface points may be and still be stray: above 1 more are, below 1 fewer",
-        default=1.0,
-        min=0.01,
-        max=100.0,
         soft_min=0.25,
         soft_max=4.0,
+        **STRAYS["strictness"].keywords,
     )
     smallest: IntProperty(
         name="Small Parts Below",
-        description="Points of parts with fewer points than this are stray, too; the largest part never is",
-        default=30,
-        min=0,
         soft_max=1000,
+        **STRAYS["smallest"].keywords,
     )
     smallest_area: FloatProperty(
         name="Small Areas Below",
-        description="Points of parts with less area than this are stray, too; the largest part never is",
-        default=0.0,
-        min=0.0,
         unit="AREA",
+        **STRAYS["smallest_area"].keywords,
     )
     only_selected: BoolProperty(name="Among Selected", description="Look among the selected points only", default=False)
 
@@ -101,8 +95,7 @@ class StrayPoints(StraySettings, Tool):
 
         def compute(progress):
             found = find(progress)
-            if found.all():
-                raise PointCloudError(f"All {len(found):,} points are stray at this strictness. Lower it.")
+            check_some_stay(found)
             return found
 
         return compute
@@ -122,10 +115,9 @@ class StrayPoints(StraySettings, Tool):
 
     def write(self, context, obj, result):
         write_attribute(obj.data, STRAY, result)
-        count = np.count_nonzero(result)
-        done = self._act(context, obj, result) if count else ""
+        done = self._act(context, obj, result) if result.any() else ""
         tag_changed(obj.data)
-        return [f"{obj.name}: {count:,} of {len(result):,} points are stray ({count / len(result):.2%}){done}"]
+        return [f"{obj.name}: {stray_line(result)}{done}"]
 
     def _act(self, context, obj, found):
         """Do with the stray points, (n,) bool, what the action says, and return a text on it."""

@@ -5,15 +5,16 @@ import numpy as np
 from bpy.props import BoolProperty, FloatProperty
 
 from ... import core
+from ...command.alignment import check_found, doubts
+from ...command.quantities import DEVIATION
 from ...core import PointCloudError
 from ..objects.attributes import COMPARED, tag_changed, write_attribute
 from ..objects.place import activate, hide
-from ..objects.quantities import DEVIATION
 from ..objects.reading import obstacle
 from ..objects.result import length_text
 from ..registration import Registration, Row
 from ..running.application import ShownOperator, Tool, naming, operator_reader
-from .align import Motion, check_found, doubts, others
+from .align import ADVICE, Motion, others
 
 
 class Compare(Tool):
@@ -55,7 +56,7 @@ class Compare(Tool):
             points, aligned = reading.points + shift, None
             if motion is not None:
                 aligned = core.align(points, laplacian.points, progress=lambda stage, _: progress(stage, 0.8))
-                check_found(aligned, own_name, name)
+                check_found(aligned, own_name, name, ADVICE)
                 linear = aligned.matrix[:3, :3]
                 points, normals = points @ linear.T + aligned.matrix[:3, 3], normals @ linear.T
             found = core.surface_deviation(

@@ -7,8 +7,7 @@ import numpy as np
 from bpy.props import EnumProperty, FloatProperty
 
 from ... import core
-from ..objects.attributes import tag_changed, write_attribute
-from ..objects.quantities import (
+from ...command.quantities import (
     CURVATURE_1,
     CURVATURE_2,
     CURVEDNESS,
@@ -19,6 +18,7 @@ from ..objects.quantities import (
     rows_of,
     written_by,
 )
+from ..objects.attributes import tag_changed, write_attribute
 from ..objects.result import length_text
 from ..registration import Registration, Row
 from ..running import cache

@@ -5,10 +5,10 @@ import numpy as np
 from bpy.props import EnumProperty, FloatProperty, StringProperty
 
 from ... import core
+from ...command.quantities import DISTANCE, FIELD
 from ...core import PointCloudError
 from ..objects.attributes import point_count, read_attribute, tag_changed, write_attribute
 from ..objects.groups import HIGH, LOW, SOURCE, VALUE, chosen_weights, group_kind, has_group, is_chosen
-from ..objects.quantities import DISTANCE, FIELD
 from ..objects.result import length_text
 from ..registration import Registration, Row
 from ..running import cache

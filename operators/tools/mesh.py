@@ -6,13 +6,13 @@ import numpy as np
 from bpy.props import BoolProperty, FloatProperty
 
 from ... import core
+from ...command.quantities import quantity
 from ..objects.attributes import DISC, STORABLE, point_count, read_attribute, write_attribute
 from ..objects.color_choices import COLOR_CHOICES
 from ..objects.colors import COLOR, COLORS, own_colors, splat_colors
 from ..objects.groups import add_group
 from ..objects.handlers import notify
 from ..objects.place import activate, copy_place, hide
-from ..objects.quantities import quantity
 from ..objects.splats import has_splats
 from ..registration import Registration, Row
 from ..running import cache

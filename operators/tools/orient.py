@@ -5,15 +5,16 @@ import numpy as np
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ... import core
+from ...command.analysis import WRITE_LIMIT
+from ...command.quantities import AREA, NORMAL, ORIENTATION, RESULTS
 from ...core import PointCloudError
-from ..objects.attributes import ORIENTATION, read_attribute
-from ..objects.quantities import AREA, NORMAL, RESULTS
+from ..objects.attributes import read_attribute
 from ..objects.reading import read_points
 from ..objects.result import write_result
 from ..registration import Registration, Row
 from ..running import cache
 from ..running.application import ShownOperator, Tool
-from .analyze import WRITE_LIMIT, plan_analysis
+from .analyze import plan_analysis
 
 
 class OrientNormals(Tool):

@@ -5,10 +5,10 @@ import numpy as np
 from bpy.props import BoolProperty, EnumProperty, IntProperty
 
 from ... import core
+from ...command.quantities import HEAT_SIGNATURE, SEGMENT, WAVE_SIGNATURE
 from ...core import PointCloudError
 from ..objects.attributes import read_attribute, remove_numbered, tag_changed, write_attribute
 from ..objects.deleting import keep_points
-from ..objects.quantities import HEAT_SIGNATURE, SEGMENT, WAVE_SIGNATURE
 from ..objects.result import EIGENVALUES, check_writable
 from ..registration import Registration, Row
 from ..running import cache

@@ -7,20 +7,19 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, IntProperty
 
-from ... import core
+from ...command.analysis import WRITE_LIMIT, continued
+from ...command.quantities import AREA, MEAN_CURVATURE, eigenvector_name
 from ...core import PointCloudError
 from ..objects.all_or_nothing import all_or_nothing
-from ..objects.attributes import eigenvector_name
 from ..objects.handlers import notify
 from ..objects.modifiers import COLLECTION, get_input, is_sequence
-from ..objects.quantities import AREA, MEAN_CURVATURE
 from ..objects.reading import obstacle, read_points, sharing_objects
 from ..objects.result import analysis_names, area_text, check_writable, write_result
 from ..registration import Registration, Row
 from ..running.application import naming
 from ..running.job import JobOperator
 from ..running.ready import reporting
-from .analyze import WRITE_LIMIT, plan_analysis
+from .analyze import plan_analysis
 
 
 def frames_of(obj) -> list:
@@ -57,13 +56,8 @@ def continue_modes(analysis, points, earlier):
     tuple
         For the next frame.
     """
-    spectrum = analysis.spectrum
-    count = spectrum.eigenvectors.shape[1]  # of a subset, fewer may be transferred
-    spectrum, overlaps = replace(spectrum, eigenvalues=spectrum.eigenvalues[:count]), np.ones(count)
-    if earlier is not None:
-        matched = core.match_modes(spectrum, analysis.measures[AREA], points, *earlier)
-        spectrum, overlaps = matched.spectrum, matched.overlaps
-    return replace(analysis, spectrum=spectrum), overlaps, (spectrum, points)
+    spectrum, overlaps, earlier = continued(analysis.spectrum, analysis.measures[AREA], points, earlier)
+    return replace(analysis, spectrum=spectrum), overlaps, earlier
 
 
 class MESHFREE_OT_analyze_sequence(JobOperator, bpy.types.Operator):

@@ -8,12 +8,12 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
 
+from ...command.quantities import MOTION, NORMAL
 from ...core import PointCloudError
 from ..objects import motion_files
 from ..objects.groups import SOURCE
 from ..objects.motion import show_frame, show_values, write_frames
 from ..objects.motion_nodes import forget_groups, mode_name, show_motion
-from ..objects.quantities import MOTION, NORMAL
 from ..objects.result import length_text
 from ..objects.touching import places_of
 from ..registration import Registration, Row

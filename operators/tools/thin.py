@@ -1,18 +1,15 @@
 """Fewer points of the same surface, with all that they hold."""
 
 import bpy
-import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
-from ... import core
+from ...command.cleaning import THIN_OUT, thin_line, thinner
 from ..objects.attributes import tag_changed
 from ..objects.deleting import check_deletable, keep_points
 from ..objects.reading import read_points
 from ..objects.result import length_text
 from ..registration import Registration, Row
 from ..running.application import ApplicationOperator, Tool
-
-_AUTOMATIC = 2.0  # spacings of the points
 
 
 class ThinOut(Tool):
@@ -24,43 +21,31 @@ class ThinOut(Tool):
 
     by: EnumProperty(
         name="By",
-        description="What says how many points stay",
         items=[
             ("SPACING", "Spacing", "No two points are nearer to each other than the spacing"),
             ("NUMBER", "Number", "At most a number of points stays"),
         ],
-        default="SPACING",
+        **THIN_OUT["by"].keywords,
     )
     spacing: FloatProperty(
         name="Spacing",
-        description="Least distance between points, for Spacing; 0 for twice the present one",
-        default=0.0,
-        min=0.0,
         subtype="DISTANCE",
+        **THIN_OUT["spacing"].keywords,
     )
     count: IntProperty(
         name="Number",
-        description="How many points stay at most, for Number",
-        default=10_000,
-        min=1,
         soft_max=1_000_000,
+        **THIN_OUT["count"].keywords,
     )
     keep_edges: BoolProperty(
-        name="Keep Edges", description="Keep points at edges before others, the sharpest first", default=True
+        name="Keep Edges",
+        **THIN_OUT["keep_edges"].keywords,
     )
 
     def plan(self, context, obj):
         check_deletable(obj)
-        points, keep_edges = read_points(context, obj).points, self.keep_edges
-        spacing = (self.spacing or _AUTOMATIC * core.geometry.typical_distance(points)) or None
-        size = {"count": self.count} if self.by == "NUMBER" or spacing is None else {"spacing": spacing}
-
-        def compute(progress):
-            kept = np.zeros(len(points), dtype=bool)
-            kept[core.thin_out(points, keep_edges=keep_edges, progress=progress, **size)] = True
-            return kept, size.get("spacing")
-
-        return compute
+        points = read_points(context, obj).points
+        return thinner(points, self.by, self.spacing, self.count, self.keep_edges)
 
     def write(self, context, obj, result):
         kept, spacing = result
@@ -68,7 +53,7 @@ class ThinOut(Tool):
             keep_points(context, obj, kept)
         tag_changed(obj.data)
         apart = "" if spacing is None else f", at least {length_text(spacing)} from each other"
-        return [f"{obj.name}: {np.count_nonzero(kept):,} of {len(kept):,} points are left{apart}"]
+        return [f"{obj.name}: {thin_line(kept)}{apart}"]
 
 
 class MESHFREE_OT_thin_out(ThinOut, ApplicationOperator, bpy.types.Operator):

@@ -4,8 +4,8 @@ import bpy
 import numpy as np
 
 from ... import core
+from ...command.quantities import SURFACE_VARIATION
 from ..objects.attributes import tag_changed, write_attribute
-from ..objects.quantities import SURFACE_VARIATION
 from ..registration import Registration, Row
 from ..running import cache
 from ..running.application import ShownOperator, Tool, operator_reader

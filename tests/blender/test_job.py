@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
+from command.stages import StageTimes
 from tests.blender.clouds import add_object, everything, sphere_points
 from tests.blender.conftest import part
 
@@ -415,9 +416,9 @@ def test_lines_of_progress_without_a_window(capfd):
     assert "Analyze Points: " not in out
 
 
-def test_stages_add_up_and_are_told_on(stages):
+def test_stages_add_up_and_are_told_on():
     told = []
-    with stages.StageTimes(lambda *progress: told.append(progress)) as times:
+    with StageTimes(lambda *progress: told.append(progress)) as times:
         times("One", 0.0)
         times("Two", 0.5)
         times("One", 0.75)

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from operators.objects.quantities import quantity
+from command.quantities import quantity
 from tests.blender.clouds import add_group, add_object, attribute, sphere_points
 from tests.blender.test_panel import draw
 from tests.blender.test_seeing import add_camera

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from operators.objects.quantities import QUANTITIES, quantity, rows_of
+from command.quantities import QUANTITIES, quantity, rows_of
 from tests.blender.clouds import add_group, add_object, attribute, sphere_points
 from tests.results import RESULTS
 

@@ -5,7 +5,7 @@ import re
 import bpy
 import pytest
 
-from operators.objects.quantities import QUANTITIES
+from command.quantities import QUANTITIES
 from tests.blender.test_manual import operators
 
 # Words that stay small within a label, and names that are not written as others are.

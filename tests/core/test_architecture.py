@@ -1,4 +1,4 @@
-"""The arrows of the house: ui -> operators -> core, the wings of core among themselves, and no bpy in core."""
+"""The arrows of the house: ui -> operators -> command -> core, the wings of core among themselves, no bpy in core."""
 
 import ast
 import functools
@@ -41,11 +41,18 @@ def taken(path):
     return re.findall(r"(?<![.\w])core((?:\.\w+)+)", path.read_text(encoding="utf-8"))
 
 
-BLENDER_SIDE = sorted(path for package in ("operators", "ui") for path in (ROOT / package).rglob("*.py"))
+BLENDER_SIDE = sorted(path for package in ("command", "operators", "ui") for path in (ROOT / package).rglob("*.py"))
 LIGHT = ("errors", "files", "memory", "options")  # modules and packages of core without scipy
 
 
-@pytest.mark.parametrize(("package", "forbidden"), [("core", {"bpy", "operators", "ui"}), ("operators", {"ui"})])
+@pytest.mark.parametrize(
+    ("package", "forbidden"),
+    [
+        ("core", {"bpy", "command", "operators", "ui"}),
+        ("command", {"bpy", "operators", "ui"}),
+        ("operators", {"ui"}),
+    ],
+)
 def test_imports_point_one_way(package, forbidden):
     files = sorted((ROOT / package).rglob("*.py"))
     assert files
@@ -71,7 +78,7 @@ def test_operators_have_these_wings():
 def test_wings_of_operators_point_one_way(wing):
     files = sorted((ROOT / "operators" / wing).glob("*.py"))
     found = {(file.name, name) for file in files for name in imported(file) if name.startswith("..")}
-    allowed = ("core", "registration", *OPERATORS[wing])
+    allowed = ("command", "core", "registration", *OPERATORS[wing])
     assert {(file, name) for file, name in found if not name.lstrip(".").startswith(allowed)} == set()
 
 

@@ -4,8 +4,8 @@ import re
 
 import pytest
 
-from operators.objects import quantities
-from operators.objects.quantities import QUANTITIES, quantity
+from command import quantities
+from command.quantities import QUANTITIES, quantity
 from tests.core.test_architecture import BLENDER_SIDE, ROOT, imported
 
 PAGES = [path.read_text(encoding="utf-8") for path in sorted(ROOT.glob("docs/operators/*.md"))]

@@ -1,6 +1,8 @@
 """The wheel in an environment of its own: what is in it, its example, files, types, and the code of the README."""
 
+import json
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -24,6 +26,7 @@ def test_it_holds_the_packages_in_the_tree_and_nothing_else(wheel):
         return {path.as_posix() for path in found if "__pycache__" not in path.parts}
 
     wanted = {f"{NAME}/{path}" for ending in ("*.py", "*.pyi", "py.typed") for path in sources("core", ending)}
+    wanted |= {f"{NAME}/command/{path}" for path in sources("command", "*.py")}
     with zipfile.ZipFile(wheel) as packed:
         assert {name for name in packed.namelist() if ".dist-info/" not in name} == wanted
 
@@ -62,6 +65,21 @@ mf.files.write_points(Path("b.ply"), table)
 print(np.abs(mf.files.read_points(Path("b.ply")).points - points).max() < 1e-6)
 """
     assert python(place, code, tmp_path) == "True\n"
+
+
+def test_its_program_goes_from_files_to_files(place, tmp_path):
+    """As core, called in Python, does."""
+    shutil.copy(ROOT / "docs" / "coral.ply", tmp_path)
+    call(program(place, "meshfree"), "thin-out", "coral.ply", "--spacing", 0.12, "--out", "thin.ply", cwd=tmp_path)
+    printed = call(program(place, "meshfree"), "analyze", "thin.ply", "--out", "a.npz", cwd=tmp_path)
+    line = json.loads(printed)
+    code = (
+        f"from pathlib import Path; import {NAME} as mf; points = mf.files.read_points(Path('thin.ply')).points\n"
+        "print(mf.build_laplacian(points).areas.sum())"
+    )
+    assert line["total_area"] == float(python(place, code, tmp_path))
+    assert (tmp_path / "a.npz").stat().st_size > 1e5
+    assert "usage: meshfree" in call(program(place, "meshfree"), "--help", cwd=tmp_path)
 
 
 USER = """

@@ -3,7 +3,7 @@
 import csv
 import json
 
-from ...core.files import replacing
+from . import core
 
 TABLES = (".csv", ".json")
 
@@ -13,7 +13,7 @@ def write_rows(path, records):
 
     An older file is kept if it fails.
     """
-    with replacing(path) as part, open(part, "w", encoding="utf-8", newline="") as file:
+    with core.files.replacing(path) as part, open(part, "w", encoding="utf-8", newline="") as file:
         if path.suffix.lower() == ".json":
             json.dump(records, file, indent=1)
             return
@@ -24,5 +24,5 @@ def write_rows(path, records):
 
 def write_text(path, text):
     """Write a file of text; an older one is kept if it fails."""
-    with replacing(path) as part:
+    with core.files.replacing(path) as part:
         part.write_text(text, encoding="utf-8", newline="\n")

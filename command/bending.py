@@ -6,10 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ... import core
-from ...core import PointCloudError
-from ...core.files import WRITABLE, PointTable, write_points
-from .verbs import ONE_LINE, Verb
+from . import core
+from .verb import ONE_LINE, Verb
 
 _SHARES = (0.01, 0.5, 0.99)  # quantiles that are printed
 _FLAT = 0.3  # ratio of the shortest to the middle axis below which a splat is flat
@@ -49,7 +47,7 @@ class Deform(Verb):
     help = "move points or Gaussian splats by handles that a JSON file names"
     description = f"Move points or Gaussian splats by handles that a JSON file names. {ONE_LINE}"
     inputs = "files of points or splats"
-    outputs = WRITABLE
+    outputs = core.files.WRITABLE
     reads = ("handles",)
 
     def add_options(self, parser):
@@ -64,12 +62,12 @@ class Deform(Verb):
 
     def run(self, path, arguments, output):
         if output is None:
-            raise PointCloudError("Nothing would be written. Give --out or --out-dir.")
+            raise core.PointCloudError("Nothing would be written. Give --out or --out-dir.")
         wanted = _read_handles(arguments.handles)
         given = core.splats.read_file(path)
-        splats = None if isinstance(given, PointTable) else given
+        splats = None if isinstance(given, core.files.PointTable) else given
         if splats is not None and output.suffix.lower() != ".ply":
-            raise PointCloudError(f"Splats cannot be written to {output}. Let its name end in .ply.")
+            raise core.PointCloudError(f"Splats cannot be written to {output}. Let its name end in .ply.")
         points = given.points if splats is None else splats.positions
         handles, goal = _moves(wanted, points)
         anchors = [_members(one, points, "anchors") for one in wanted.get("anchors", [])]
@@ -79,7 +77,7 @@ class Deform(Verb):
         moved = deformer.solve(goal)
         written = []
         if splats is None:
-            written = write_points(output, replace(given, points=moved), double=not given.single)
+            written = core.files.write_points(output, replace(given, points=moved), double=not given.single)
         else:
             core.write_splats(output, splats.deformed(moved, deformer.gradients(moved)))
         farthest = float(np.linalg.norm(moved - points, axis=1).max())
@@ -92,15 +90,15 @@ def _read_handles(path):
     try:
         wanted = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
-        raise PointCloudError(f"{path} cannot be read: {error.strerror or error}. Check its name.") from error
+        raise core.PointCloudError(f"{path} cannot be read: {error.strerror or error}. Check its name.") from error
     except ValueError as error:
-        raise PointCloudError(f"{path} is no JSON: {error}. Mend it.") from error
+        raise core.PointCloudError(f"{path} is no JSON: {error}. Mend it.") from error
     listed = isinstance(wanted, dict) and all(
         isinstance(wanted.get(name, []), list) and all(isinstance(one, dict) for one in wanted.get(name, []))
         for name in ("handles", "anchors")
     )
     if not listed or not wanted.get("handles"):
-        raise PointCloudError(f'{path} names no handles. Give {{"handles": [{{...}}], "anchors": [{{...}}]}}.')
+        raise core.PointCloudError(f'{path} names no handles. Give {{"handles": [{{...}}], "anchors": [{{...}}]}}.')
     return wanted
 
 
@@ -110,7 +108,7 @@ def _moves(wanted, points):
     goals = [_goal(one, points[rows]) for one, rows in zip(wanted["handles"], members, strict=True)]
     rows = np.concatenate(members)
     if len(np.unique(rows)) < len(rows):
-        raise PointCloudError("Some points are in two handles. Make balls smaller, or name each point once.")
+        raise core.PointCloudError("Some points are in two handles. Make balls smaller, or name each point once.")
     return rows, np.concatenate(goals)
 
 
@@ -119,15 +117,17 @@ def _members(one, points, name):
     if "indices" in one:
         rows = _numbers(one["indices"], (-1,), "indices")
         if not np.isin(rows, np.arange(len(points))).all():
-            raise PointCloudError(f"The {name} name points that are not there. Give whole numbers below {len(points)}.")
+            raise core.PointCloudError(
+                f"The {name} name points that are not there. Give whole numbers below {len(points)}."
+            )
         return rows.astype(int)
     if {"center", "radius"} <= one.keys():
         center, radius = _numbers(one["center"], (3,), "center"), _numbers(one["radius"], (), "radius")
         rows = np.flatnonzero(np.linalg.norm(points - center, axis=1) <= radius)
         if not len(rows):
-            raise PointCloudError(f"No point is in a ball of the {name}. Give another center or a larger radius.")
+            raise core.PointCloudError(f"No point is in a ball of the {name}. Give another center or a larger radius.")
         return rows
-    raise PointCloudError(f'One of the {name} names no points. Give "indices", or "center" and "radius".')
+    raise core.PointCloudError(f'One of the {name} names no points. Give "indices", or "center" and "radius".')
 
 
 def _goal(one, points):
@@ -139,7 +139,7 @@ def _goal(one, points):
         return points @ matrix[:3, :3].T + matrix[:3, 3]
     if "shift" in one:
         return points + _numbers(one["shift"], (3,), "shift")
-    raise PointCloudError('One of the handles goes nowhere. Give "shift", "matrix" or "positions".')
+    raise core.PointCloudError('One of the handles goes nowhere. Give "shift", "matrix" or "positions".')
 
 
 def _numbers(given, shape, name):
@@ -150,5 +150,7 @@ def _numbers(given, shape, name):
         array = np.array(np.nan)
     fits = array.ndim == len(shape) and all(size in (own, -1) for own, size in zip(array.shape, shape, strict=True))
     if not fits or not np.isfinite(array).all():
-        raise PointCloudError(f'"{name}" must be {" x ".join(map(str, shape)) or "one"} finite numbers. Mend that.')
+        raise core.PointCloudError(
+            f'"{name}" must be {" x ".join(map(str, shape)) or "one"} finite numbers. Mend that.'
+        )
     return array

@@ -6,6 +6,8 @@ To add a result, add a row. Nothing here needs Blender.
 from operator import attrgetter
 from typing import NamedTuple
 
+PREFIX = "lb_"  # of the names of attributes of this extension
+ORIENTATION = "lb_orientation"  # vectors that orient the normals, where a user chose a side
 AREA, NORMAL = "lb_area", "lb_normal"
 MEAN_CURVATURE, GAUSSIAN_CURVATURE = "lb_mean_curvature", "lb_gaussian_curvature"
 BOUNDARY, COMPONENT = "lb_boundary", "lb_component"
@@ -313,6 +315,11 @@ def rows_of(tool: str) -> tuple:
 def written_by(tool: str) -> tuple:
     """Return the names of the attributes that a tool writes."""
     return tuple(row.attribute for row in rows_of(tool))
+
+
+def eigenvector_name(mode: int) -> str:
+    """Return the name of the attribute that holds a mode; modes are counted from 1."""
+    return f"{EIGENVECTOR}{mode:03d}"
 
 
 RESULTS = written_by("analyze")  # always in the panel; those of tools if they exist

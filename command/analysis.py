@@ -1,0 +1,175 @@
+"""What an analysis computes from arrays, for the command line and for Blender's tools."""
+
+from dataclasses import asdict, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from . import core
+from .quantities import AREA, BOUNDARY, COMPONENT, DOUBT, rows_of
+
+WRITE_LIMIT = 50  # default number of modes written as attributes: each takes 4 bytes per point in the file
+
+
+class Built(NamedTuple):
+    """An operator and the mean curvature computed by it."""
+
+    laplacian: "core.LaplaceBeltrami"
+    mean_curvature: np.ndarray
+
+    @property
+    def measures(self) -> dict:
+        """Results at the points, by the names of their attributes."""
+        return {row.attribute: row.of(self) for row in rows_of("analyze")}
+
+
+def build(points, options, boundary, left_out, progress) -> Built:
+    """Build the operator of points by the method of the options; the paper's has no boundary.
+
+    Parameters
+    ----------
+    points : ndarray, (n, 3)
+    options : LaplacianOptions or PaperOptions
+    boundary : ndarray, (n,) bool, or None
+        The boundary points; None leaves it to the options.
+    left_out : ndarray, (m,) int
+        Splats that are left out.
+    progress : callable
+        Called as ``progress(stage, fraction)``.
+    """
+    given = {"left_out": left_out, "progress": progress}
+    if isinstance(options, core.PaperOptions):
+        laplacian = core.paper.build_laplacian(points, **asdict(options), **given)
+    else:
+        laplacian = core.build_laplacian(points, options=options, boundary=boundary, **given)
+    progress("Curvature", 1.0)
+    laplacian = replace(laplacian, notices=[*floating_notices(left_out), *laplacian.notices])
+    return Built(laplacian, core.mean_curvature(laplacian))
+
+
+def oriented(built, orientation) -> Built:
+    """Return the same with normals turned to the side of some vectors, (n, 3)."""
+    laplacian = built.laplacian.toward(orientation)
+    kept = np.einsum("ij,ij->i", laplacian.normals, built.laplacian.normals) > 0.0
+    return Built(laplacian, np.where(kept, built.mean_curvature, -built.mean_curvature))
+
+
+def floating_notices(out) -> list:
+    """Return a notice of the splats that were left out, if any."""
+    if not len(out):
+        return []
+    return [
+        f"Floaters left out of the operator (nearly transparent, huge or isolated splats): {len(out):,}. Select"
+        " Floaters selects them. They move with the nearest splats."
+    ]
+
+
+def resolved_modes(modes: int, compute):
+    """Compute modes, or as many of them as the points resolve, with a notice.
+
+    Parameters
+    ----------
+    modes : int
+    compute : callable
+        Function of a number that returns so many modes.
+
+    Returns
+    -------
+    Spectrum
+    list of str
+        Notices.
+    """
+    try:
+        return compute(modes), []
+    except core.UnresolvedModesError as error:
+        if error.resolved == 0:
+            raise
+        notice = f"Only {error.resolved} of {modes} modes were computed: the others are finer than the points resolve."
+        return compute(error.resolved), [notice]
+
+
+def continued(spectrum, areas, points, earlier):
+    """Match modes to those of the frame before.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        Of a subset, fewer modes may be transferred than there are eigenvalues.
+    areas : ndarray, (n,)
+    points : ndarray, (n, 3)
+        All points of the object, in the world.
+    earlier : tuple of Spectrum and ndarray, or None
+        The third result for the frame before; None for the first frame, which is not changed.
+
+    Returns
+    -------
+    Spectrum
+    ndarray, (count,)
+        How well each mode continues, see `match_modes`.
+    tuple
+        For the next frame.
+    """
+    count = spectrum.eigenvectors.shape[1]
+    spectrum, overlaps = replace(spectrum, eigenvalues=spectrum.eigenvalues[:count]), np.ones(count)
+    if earlier is not None:
+        matched = core.match_modes(spectrum, areas, points, *earlier)
+        spectrum, overlaps = matched.spectrum, matched.overlaps
+    return spectrum, overlaps, (spectrum, points)
+
+
+def total_area(measures) -> float:
+    """Return the area of the whole surface."""
+    return float(measures[AREA].sum())
+
+
+def trusted_area(measures) -> float:
+    """Return the area of the parts whose results are not in doubt."""
+    return float(measures[AREA][measures[DOUBT] == 0].sum())
+
+
+def counts(measures) -> dict:
+    """Return the numbers of components, boundary points and points left out."""
+    component = measures[COMPONENT]
+    return {
+        "component_count": int(component.max()) + 1,
+        "boundary_count": int(np.count_nonzero(measures[BOUNDARY])),
+        "left_out_count": int(np.count_nonzero(component < 0)),
+    }
+
+
+def figures(measures, spectrum) -> dict:
+    """Return what the command line prints of an analysis; `spectrum` may be None."""
+    return {
+        "points": len(measures[AREA]),
+        "total_area": total_area(measures),
+        "trusted_area": trusted_area(measures),
+        **counts(measures),
+        "eigenvalues": [] if spectrum is None else spectrum.eigenvalues.tolist(),
+    }
+
+
+def arrays(place, built, spectrum) -> dict:
+    """Return all arrays of an analysis, in double precision, in lengths and axes of the world.
+
+    Those of the stiffness matrix have the names of scipy.sparse.save_npz, so that scipy.sparse.load_npz reads it.
+
+    Parameters
+    ----------
+    place : ndarray, (3,)
+        Offset of the points of the operator from those of the file.
+    built : Built
+    spectrum : Spectrum or None
+    """
+    laplacian, stiffness = built.laplacian, built.laplacian.stiffness
+    return {
+        "points": laplacian.points + place,
+        **{row.source.rpartition(".")[2]: row.of(built) for row in rows_of("analyze")},
+        "smoothing_lengths": laplacian.smoothing_lengths,
+        "eigenvalues": np.empty(0) if spectrum is None else spectrum.eigenvalues,
+        "eigenvectors": np.empty((len(laplacian.areas), 0)) if spectrum is None else spectrum.eigenvectors,
+        "format": np.array(b"csr"),
+        "shape": np.array(stiffness.shape),
+        "data": stiffness.data,
+        "indices": stiffness.indices,
+        "indptr": stiffness.indptr,
+    }

@@ -1,0 +1,75 @@
+"""Times of the stages of a computation, and its progress."""
+
+import sys
+from time import perf_counter
+
+
+class StageTimes:
+    """Progress callback for core that keeps the seconds of each stage.
+
+    Parameters
+    ----------
+    progress : callable, optional
+        Another one, which is called too.
+
+    Attributes
+    ----------
+    seconds : dict of str to float
+        Seconds by stage, complete after the ``with`` block.
+    stage : str
+        The last one that was started.
+    fraction : float
+        Its progress, or that of the whole.
+    """
+
+    def __init__(self, progress=None):
+        self.seconds = {}
+        self.stage, self.fraction = "", 0.0
+        self._began = None
+        self._progress = progress or (lambda stage, fraction: None)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *exception):
+        self._close()
+
+    def __call__(self, stage, fraction):
+        self._close()
+        self._progress(stage, fraction)
+        self.stage, self.fraction = stage, fraction
+        self._began = perf_counter()
+
+    def _close(self):
+        if self._began is not None:
+            spent = perf_counter() - self._began
+            self.seconds[self.stage] = self.seconds.get(self.stage, 0.0) + spent
+            self._began = None
+
+    @property
+    def rounded(self) -> dict:
+        """Seconds by stage, in milliseconds' steps."""
+        return {name: round(spent, 3) for name, spent in self.seconds.items()}
+
+
+class ToldStages(StageTimes):
+    """The same, with a line for each stage on standard error, so that standard output holds results only.
+
+    Parameters
+    ----------
+    label : str
+        What is computed.
+    """
+
+    def __init__(self, label):
+        super().__init__()
+        self._label = label
+
+    def __call__(self, stage, fraction):
+        if stage != self.stage:
+            self.tell(stage, fraction)
+        super().__call__(stage, fraction)
+
+    def tell(self, stage, fraction):
+        """Write the line of a stage that begins."""
+        print(f"{self._label}: {stage}, {fraction:.0%}", file=sys.stderr, flush=True)

@@ -1,0 +1,292 @@
+"""The verbs that need no Blender."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+
+from . import alignment, analysis, clouds, core
+from .analysis import WRITE_LIMIT
+from .bending import Deform, SplatInfo
+from .cleaning import STRAYS, THIN_OUT, check_some_stay, stray_line, thin_line, thinner
+from .measures import check_labels, check_numbers, part_table
+from .quantities import ORIENTATION, SEGMENT, STRAY, eigenvector_name, written_by
+from .rows import TABLES, write_rows
+from .settings import LAPLACIAN, Setting, add_setting, chosen, laplacian_options
+from .stages import ToldStages
+from .verb import ONE_LINE, Verb
+
+
+def make_verbs() -> list:
+    """Return new verbs of all kinds."""
+    return [Analyze(), Measure(), StrayPoints(), ThinOut(), Align(), *without_object()]
+
+
+def without_object() -> list:
+    """Return new verbs that in Blender, too, need no object."""
+    return [Info(), Convert(), SplatInfo(), Deform()]
+
+
+class CloudVerb(Verb):
+    """A verb for clouds, with options for how they are read; `work` of a subclass processes one."""
+
+    settings = ()  # its own
+
+    @property
+    def inputs(self):
+        """What is read."""
+        return f"point clouds: {', '.join(clouds.inputs())}. Text has columns x y z and may have a header"
+
+    @property
+    def outputs(self):
+        """Endings of files."""
+        return clouds.outputs()
+
+    @property
+    def description(self):
+        """What it does, in full."""
+        return f"{self.help[0].upper()}{self.help[1:]}. {ONE_LINE}"
+
+    def add_options(self, parser):
+        for setting in self.settings:
+            add_setting(parser, setting)
+        parser.add_argument(
+            "--columns",
+            default="",
+            metavar="NAMES",
+            help='names of the columns of text files, such as "x y z - r g b"; else those found',
+        )
+        parser.add_argument(
+            "--classes", default="", metavar="NUMBERS", help='classes of LAS files to read, such as "2 5"; else all'
+        )
+        parser.add_argument("--withheld", action="store_true", help="read points of LAS files, too, that are withheld")
+
+    def read(self, path, arguments, columns=""):
+        """Return what a file holds, points or splats."""
+        las = core.files.LasChoices(core.files.parse_classes(arguments.classes), arguments.withheld)
+        return clouds.read_file(path, columns, las)
+
+    def run(self, path, arguments, output):
+        given = self.read(path, arguments, arguments.columns)
+        with ToldStages(self.name) as stages:
+            figures, notices = self.work(path, given, arguments, output, stages)
+        return {**figures, "seconds": stages.rounded, "notices": [*given.notices, *notices]}
+
+    def work(self, path, given, arguments, output, progress):
+        """Process points or splats, write the output, and return what to print, and notices."""
+        raise NotImplementedError
+
+
+class Info(CloudVerb):
+    """The verb `info`."""
+
+    name = "info"
+    help = "summarize files of points: number, bounds, spacing, columns"
+    outputs = ()
+
+    def work(self, path, given, arguments, output, progress):
+        cloud = clouds.Cloud(path, given, floaters=False)
+        return {
+            "points": len(cloud.points),
+            "low": (cloud.points.min(axis=0) + cloud.place).tolist(),
+            "high": (cloud.points.max(axis=0) + cloud.place).tolist(),
+            "spacing": float(core.geometry.typical_distance(cloud.points)),
+            "columns": list(cloud.columns),
+            "colors": cloud.splats is not None or given.colors is not None,
+        }, []
+
+
+class Convert(CloudVerb):
+    """The verb `convert`."""
+
+    name = "convert"
+    help = "write points to another kind of file, with all their columns"
+
+    def work(self, path, given, arguments, output, progress):
+        if output is None:
+            raise core.PointCloudError("Nothing would be written. Give --out or --out-dir.")
+        splats = isinstance(given, core.Splats)
+        rest = {} if splats or output.suffix.lower() != ".npz" else given.attributes
+        return {"points": len(given) if splats else len(given.points)}, clouds.write(output, given, rest)
+
+
+class SurfaceVerb(CloudVerb):
+    """A verb that builds the Laplacian of a cloud."""
+
+    def add_options(self, parser):
+        super().add_options(parser)
+        for setting in LAPLACIAN.values():
+            add_setting(parser, setting)
+
+    def build(self, cloud, values, progress):
+        """Return the operator of a cloud, by the values of the settings in `LAPLACIAN`."""
+        boundary, name = None, values["boundary_group"]
+        if name:
+            boundary = cloud.numbers(name, "--boundary-group") > 0
+        built = analysis.build(cloud.points, laplacian_options(values), boundary, cloud.out, progress)
+        sides = cloud.columns.get(ORIENTATION)
+        return built if sides is None else analysis.oriented(built, sides)
+
+
+class Analyze(SurfaceVerb):
+    """The verb `analyze`, for single files or for the frames of a sequence."""
+
+    name = "analyze"
+    help = "areas, normals, curvature, boundaries and vibration modes of point clouds"
+    settings = (
+        Setting("modes", "how many vibration modes to compute", 0, 0),
+        Setting("write_limit", "modes written as attributes at most", WRITE_LIMIT, 1),
+    )
+    _earlier = None  # modes and points of the frame before
+
+    def add_options(self, parser):
+        parser.add_argument("--sequence", action="store_true", help=SEQUENCE)
+        super().add_options(parser)
+
+    def check(self, parser, arguments):
+        check_sequence(parser, arguments, chosen(self.settings, arguments)["modes"])
+
+    def work(self, path, given, arguments, output, progress):
+        cloud, own = clouds.Cloud(path, given, floaters(arguments)), chosen(self.settings, arguments)
+        built = self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress)
+        laplacian, spectrum, notices, matched = built.laplacian, None, [], {}
+        if own["modes"]:
+            modes = lambda count: laplacian.eigenpairs(count, progress=progress)  # noqa: E731
+            spectrum, notices = analysis.resolved_modes(own["modes"], modes)
+        if arguments.sequence:
+            places = cloud.points + cloud.place
+            spectrum, overlaps, self._earlier = analysis.continued(spectrum, laplacian.areas, places, self._earlier)
+            matched["overlaps"] = overlaps.tolist()
+        measures, written = built.measures, []
+        if output is not None:
+            vectors = () if spectrum is None else spectrum.eigenvectors[:, : own["write_limit"]].T
+            modes = {eigenvector_name(number): vector for number, vector in enumerate(vectors, 1)}
+            everything = analysis.arrays(cloud.place, built, spectrum) if output.suffix.lower() == ".npz" else None
+            written = clouds.write(output, given, {**measures, **modes}, everything)
+        return {**analysis.figures(measures, spectrum), **matched}, [*laplacian.notices, *notices, *written]
+
+
+SEQUENCE = (
+    "the inputs are frames in their order: each mode continues one of the frame before, with its sign, so that"
+    " eigenvalues need not ascend; overlaps of the two are written, too"
+)
+
+
+def check_sequence(parser, arguments, modes):
+    """Refuse to match the modes of frames, if there are none."""
+    if arguments.sequence and not modes:
+        parser.error("--sequence matches modes: give --modes, too")
+
+
+def floaters(arguments) -> bool:
+    """Whether floaters among splats are left out."""
+    return chosen([LAPLACIAN["leave_out_floaters"]], arguments)["leave_out_floaters"]
+
+
+class Measure(SurfaceVerb):
+    """The verb `measure`, whose outputs are tables."""
+
+    name = "measure"
+    help = "measure every component and segment: points, area, boundary, volume, and the mean of a column"
+    outputs = TABLES
+    settings = (
+        Setting("volume", "Measure the volume within closed components, too. It takes longer", True),
+        Setting("source", "Numbers at the points whose mean is wanted; empty for the roughness, if there is one", ""),
+    )
+
+    def work(self, path, given, arguments, output, progress):
+        cloud, own = clouds.Cloud(path, given, floaters(arguments)), SimpleNamespace(**chosen(self.settings, arguments))
+        labels, [roughness] = cloud.columns.get(SEGMENT), written_by("roughness")
+        if labels is not None:
+            check_labels(labels, SEGMENT, str(path))
+        name = own.source or (roughness if roughness in cloud.columns else "")
+        values = cloud.numbers(name, "--source") if name else None
+        if values is not None:
+            check_numbers(values, name, str(path))
+        laplacian = self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress).laplacian
+        rows, notices = part_table(laplacian, labels, values, _volume if own.volume else None, progress)
+        if output is not None:
+            write_rows(output, [row.record() for row in rows])
+        return {"points": len(cloud.points), "parts": [row.record() for row in rows]}, notices
+
+
+def _volume(laplacian, progress):
+    return core.enclosed_volume(laplacian, progress=progress)
+
+
+class StrayPoints(CloudVerb):
+    """The verb `stray-points`."""
+
+    name = "stray-points"
+    help = "find points off the surface, and those of small parts beside it; or delete them"
+    settings = (
+        Setting("action", "What happens to the stray points", "SHOW", choices=("SHOW", "DELETE")),
+        *STRAYS.values(),
+    )
+
+    def work(self, path, given, arguments, output, progress):
+        cloud, own = clouds.Cloud(path, given), chosen(self.settings, arguments)
+        action, strictness = own.pop("action"), own.pop("strictness")
+        found = core.Strays(cloud.points, progress=progress).chosen(strictness, **own)
+        found[cloud.out] = True
+        check_some_stay(found)
+        written = []
+        if output is not None and action == "DELETE":
+            written = clouds.write(output, cloud.taken(~found), {STRAY: found[~found]})
+        elif output is not None:
+            written = clouds.write(output, given, {STRAY: found})
+        line = f"{path.stem}: {stray_line(found)}{', deleted' if action == 'DELETE' and found.any() else ''}"
+        return {"points": len(found) - (action == "DELETE") * int(found.sum()), "done": line}, written
+
+
+class ThinOut(CloudVerb):
+    """The verb `thin-out`."""
+
+    name = "thin-out"
+    help = "leave evenly spread points, to a spacing or a number; edges first"
+    settings = tuple(THIN_OUT.values())
+
+    def work(self, path, given, arguments, output, progress):
+        cloud = clouds.Cloud(path, given, floaters=False)
+        kept, spacing = thinner(cloud.points, **chosen(self.settings, arguments))(progress)
+        written = [] if output is None else clouds.write(output, cloud.taken(kept), {})
+        apart = "" if spacing is None else f", at least {spacing:.4g} from each other"
+        return {"points": int(np.count_nonzero(kept)), "done": f"{path.stem}: {thin_line(kept)}{apart}"}, written
+
+
+class Align(CloudVerb):
+    """The verb `align`, whose outputs are in the coordinates of the reference."""
+
+    name = "align"
+    help = "move points onto the surface of those of another file, from nearby"
+    settings = tuple(alignment.ALIGN.values())
+    reads = ("reference",)
+    operator = "align_points"  # which writes the same result in Blender
+    _target = None  # points of the reference, in its coordinates
+
+    def add_options(self, parser):
+        parser.add_argument(
+            "--reference",
+            required=True,
+            metavar="FILE",
+            help="point cloud that the points are moved onto, of the kinds of inputs",
+        )
+        super().add_options(parser)
+
+    def work(self, path, given, arguments, output, progress):
+        reference = Path(arguments.reference)
+        if self._target is None:
+            self._target = clouds.Cloud(reference, self.read(reference, arguments))
+        cloud, target = clouds.Cloud(path, given), self._target
+        shift = cloud.place - target.place
+        found = core.align(cloud.points + shift, target.points, **chosen(self.settings, arguments), progress=progress)
+        alignment.check_found(found, path.stem, reference.stem)
+        written = []
+        if output is not None:
+            [residual] = written_by(self.operator)
+            moved = clouds.moved(given, cloud.points + shift, found.matrix, target.place)
+            written = clouds.write(output, moved, {residual: found.residual})
+        half = f"half of them within {alignment.middle(found):.4g}"
+        line = f"{path.stem}: {found.overlap:.0%} of the points lie on {reference.name}, {half}"
+        figures = {"points": len(cloud.points), "done": line, **alignment.figures(found, target.place)}
+        return figures, [*target.notices, *alignment.doubts(found), *written]

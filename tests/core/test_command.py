@@ -1,0 +1,232 @@
+"""The command line without Blender: verbs on clouds of files, by the function that the program calls."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import core
+from benchmarks.samplings import fibonacci_sphere, square_grid
+from command import verbs
+from command.main import run as run_command
+from core.files import PointTable, read_points, write_points
+
+FAR = np.array([400_000.0, 5_000_000.0, 100.0])
+SPHERE = fibonacci_sphere(800)
+
+
+@pytest.fixture
+def run(capsys):
+    """Run the command line; return the exit code and the JSON lines."""
+
+    def run(*arguments):
+        code = run_command([str(argument) for argument in arguments], verbs.make_verbs(), "meshfree")
+        return code, [json.loads(line) for line in capsys.readouterr().out.splitlines() if line.startswith("{")]
+
+    return run
+
+
+def write(path, points, **columns):
+    """Write points with columns, exactly."""
+    write_points(path, PointTable(points, columns))
+    return path
+
+
+class TestAnalyze:
+    def test_it_gives_what_core_gives_to_the_bit(self, run, tmp_path):
+        source = write(tmp_path / "a.ply", SPHERE)
+        code, [line] = run("analyze", source, "--modes", 4, "--out", tmp_path / "a.npz")
+        assert code == 0
+        laplacian = core.build_laplacian(SPHERE)
+        spectrum = laplacian.eigenpairs(4)
+        assert (line["points"], line["total_area"]) == (800, float(laplacian.areas.sum()))
+        assert line["eigenvalues"] == spectrum.eigenvalues.tolist()
+        assert (line["component_count"], line["boundary_count"], line["left_out_count"]) == (1, 0, 0)
+        found = np.load(tmp_path / "a.npz")
+        assert_array_equal(found["points"], SPHERE)
+        for name in ("areas", "normals", "trust", "smoothing_lengths", "gaussian_curvature"):
+            assert_array_equal(found[name], getattr(laplacian, name))
+        assert_array_equal(found["eigenvectors"], spectrum.eigenvectors)
+        assert_array_equal(found["mean_curvature"], core.mean_curvature(laplacian))
+
+    def test_a_file_of_points_keeps_its_columns_and_its_place(self, run, tmp_path):
+        source = write(tmp_path / "a.ply", SPHERE + FAR, heat=SPHERE[:, 0], normal=-SPHERE)
+        assert run("analyze", source, "--modes", 3, "--write-limit", 2, "--out", tmp_path / "b.ply")[0] == 0
+        table = read_points(tmp_path / "b.ply")
+        assert_array_equal(table.points, SPHERE + FAR)
+        assert_array_equal(table.attributes["heat"], SPHERE[:, 0])
+        assert_allclose(table.attributes["normal"], SPHERE, atol=0.01)
+        assert table.attributes["lb_area"].sum() == pytest.approx(4.0 * np.pi, rel=1e-3)
+        assert {"lb_eigenvector_002", "lb_boundary", "lb_doubt"} < table.attributes.keys()
+        assert not {"lb_eigenvector_003", "lb_normal"} & table.attributes.keys()
+
+    def test_settings_and_a_boundary_by_a_column(self, run, tmp_path):
+        points = square_grid(20)
+        edge = ((points == 0.0) | (points == 1.0))[:, :2].any(axis=1)
+        source = write(tmp_path / "a.ply", points, edge=edge.astype(np.int32))
+        code, [line] = run("analyze", source, "--boundary", "off", "--boundary-group", "edge")
+        assert (code, line["boundary_count"]) == (0, np.count_nonzero(edge))
+        code, [line] = run("analyze", source, "--boundary-group", "rim")
+        assert (code, "Its columns are edge" in line["error"]) == (1, True)
+        code, [line] = run("analyze", source, "--laplacian", "paper", "--neighbors", 60)
+        paper = core.paper.build_laplacian(points, neighbors=60)
+        assert line["total_area"] == pytest.approx(paper.areas.sum(), rel=1e-9)
+
+    def test_normals_keep_the_side_that_a_file_names(self, run, tmp_path):
+        source = write(tmp_path / "a.ply", SPHERE, lb_orientation=-SPHERE)
+        assert run("analyze", source, "--out", tmp_path / "a.npz")[0] == 0
+        found = np.load(tmp_path / "a.npz")
+        assert (np.einsum("ij,ij->i", found["normals"], SPHERE) < 0.0).all()
+        assert (found["mean_curvature"] < 0.0).all()
+
+    def test_modes_of_frames_continue(self, run, tmp_path):
+        for number, length in enumerate((0.85, 1.0, 1.15)):
+            write(tmp_path / f"frame_{number}.ply", SPHERE * [length, 1.0, 0.6])
+        code, lines = run("analyze", "--sequence", tmp_path, "--modes", 4)
+        assert (code, len(lines)) == (0, 3)
+        assert min(min(line["overlaps"]) for line in lines) > 0.9
+        assert lines[2]["eigenvalues"][1] > lines[2]["eigenvalues"][2]  # they have crossed
+        assert run("analyze", "--sequence", tmp_path)[0] == 2
+
+
+class TestCleaning:
+    def test_stray_points_are_marked_or_deleted(self, run, tmp_path):
+        points = np.vstack([SPHERE, [[0.0, 0.0, 3.0], [3.0, 0.0, 0.0]]])
+        source = write(tmp_path / "a.ply", points, row=np.arange(802))
+        code, [line] = run("stray-points", source, "--out", tmp_path / "b.ply")
+        assert (code, line["points"]) == (0, 802)
+        assert line["done"].startswith("a: 2 of 802 points are stray")
+        assert_array_equal(read_points(tmp_path / "b.ply").attributes["lb_stray"], np.arange(802) >= 800)
+        code, [line] = run("stray-points", source, "--action", "delete", "--out", tmp_path / "c.ply")
+        assert (code, line["points"]) == (0, 800)
+        assert_array_equal(read_points(tmp_path / "c.ply").attributes["row"], np.arange(800))
+
+    def test_thinned_points_keep_distance_and_columns(self, run, tmp_path):
+        source = write(tmp_path / "a.ply", SPHERE, row=np.arange(800))
+        code, [line] = run("thin-out", source, "--spacing", 0.3, "--out", tmp_path / "b.ply")
+        table = read_points(tmp_path / "b.ply")
+        apart = np.linalg.norm(table.points[:, None] - table.points, axis=2) + 9.0 * np.eye(len(table.points))
+        assert (code, line["points"]) == (0, len(table.points))
+        assert 0.3 <= apart.min() < 0.4
+        assert_array_equal(table.points, SPHERE[table.attributes["row"].astype(int)])
+        code, [line] = run("thin-out", source, "--by", "number", "--count", 99)
+        assert line["points"] <= 99
+
+
+class TestMeasure:
+    def test_components_segments_and_means(self, run, tmp_path):
+        small = fibonacci_sphere(400)
+        both = np.vstack([small, small + [5.0, 0.0, 0.0]])
+        columns = {"lb_segment": np.repeat([0, 1, 0, 1], 200), "height": both[:, 0]}
+        source = write(tmp_path / "a.ply", both, **columns)
+        code, [line] = run("measure", source, "--source", "height", "--out", tmp_path / "a.csv")
+        assert code == 0
+        rows = {row["name"]: row for row in line["parts"]}
+        assert rows.keys() == {"Component 0", "Component 1", "Segment 0", "Segment 1"}
+        for name, mean in (("Component 0", 0.0), ("Component 1", 5.0)):
+            assert rows[name]["area"] == pytest.approx(4.0 * np.pi, abs=rows[name]["area_uncertainty"])
+            assert rows[name]["volume"] == pytest.approx(4.0 * np.pi / 3.0, rel=5e-3)
+            assert rows[name]["mean"] == pytest.approx(mean, abs=0.01)
+        assert (tmp_path / "a.csv").read_text().startswith("name,points,area,")
+        assert all(row["volume"] is None for row in run("measure", source, "--no-volume")[1][0]["parts"])
+
+    @pytest.mark.parametrize(
+        ("column", "values", "text"),
+        [("lb_segment", np.full(800, -1), "names no parts"), ("height", SPHERE, "3 numbers at each point")],
+    )
+    def test_columns_that_cannot_be_used(self, run, tmp_path, column, values, text):
+        source = write(tmp_path / "a.ply", SPHERE, **{column: values})
+        code, [line] = run("measure", source, *(["--source", column] if column == "height" else []))
+        assert (code, text in line["error"], str(source) in line["error"]) == (1, True, True)
+
+
+class TestAlign:
+    def test_points_normals_and_scanner_move_to_the_reference(self, run, tmp_path):
+        body = SPHERE * [1.0, 0.8, 0.6] * (1.2 - 0.3 * np.exp(-((SPHERE - [1, 1, 0]) ** 2).sum(axis=1)))[:, None]
+        turn, _ = np.linalg.qr([[0.995, -0.0998, 0.01], [0.0998, 0.995, 0.0], [0.0, 0.02, 1.0]])
+        turn *= np.sign(np.diag(turn))
+        scanner, shift = np.tile([0.0, 0.0, 9.0], (800, 1)), np.array([0.05, 0.0, -0.05])
+        there = {"normal": SPHERE @ turn, "scanner": (scanner - shift) @ turn + FAR}
+        source = write(tmp_path / "a.ply", (body - shift) @ turn + FAR, **there)
+        plan = write(tmp_path / "plan.ply", body + FAR)
+        code, [line] = run("align", source, "--reference", plan, "--out", tmp_path / "b.ply")
+        assert code == 0, line
+        assert line["converged"]
+        table = read_points(tmp_path / "b.ply")
+        assert_allclose(table.points - FAR, body, atol=1e-3)
+        assert_allclose(table.attributes["normal"], SPHERE, atol=1e-3)
+        assert_allclose(table.attributes["scanner"] - FAR, scanner, atol=1e-2)
+        matrix = np.array(line["matrix"])
+        assert_allclose(read_points(source).points @ matrix[:3, :3].T + matrix[:3, 3], table.points, atol=1e-6)
+        assert run("align", source, "--reference", plan, "--out", plan)[0] == 1
+
+
+class TestFiles:
+    def test_points_go_from_kind_to_kind(self, run, tmp_path):
+        source = write(tmp_path / "a.ply", SPHERE, heat=SPHERE[:, 1], row=np.arange(800))
+        before = "a.ply"
+        for name in ("a.csv", "b.xyz", "c.ply", "d.npz"):
+            code, [line] = run("convert", tmp_path / before, "--out", tmp_path / name)
+            assert (code, line["points"], line["output"]) == (0, 800, str(tmp_path / name))
+            before = name if name != "b.xyz" else before  # which has no names
+        assert_array_equal(np.load(tmp_path / "d.npz")["row"], np.arange(800))
+        assert_allclose(np.load(tmp_path / "d.npz")["points"], read_points(source).points, rtol=0.0, atol=1e-15)
+        assert run("convert", source)[1][0]["error"].startswith("Nothing would be written")
+
+    def test_a_summary(self, run, tmp_path):
+        code, [line] = run("info", write(tmp_path / "a.ply", SPHERE + FAR, heat=SPHERE[:, 1]))
+        assert (code, line["points"], line["columns"], line["colors"]) == (0, 800, ["heat"], False)
+        assert_allclose(line["low"], (SPHERE + FAR).min(axis=0), rtol=1e-15)
+        assert_allclose(line["high"], (SPHERE + FAR).max(axis=0), rtol=1e-15)
+        assert line["spacing"] == pytest.approx(np.sqrt(4.0 * np.pi / 800), rel=0.1)
+
+    def test_splats_stay_splats(self, run, tmp_path):
+        count = len(SPHERE)
+        splats = core.Splats(
+            positions=SPHERE,
+            scales=np.full((count, 3), 0.05),
+            rotations=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
+            opacities=np.where(np.arange(count) < 5, 0.001, 0.9),
+            colors=np.zeros((count, 3)),
+            harmonics=np.zeros((count, 0, 3)),
+        )
+        core.write_splats(tmp_path / "a.ply", splats)
+        code, [line] = run("analyze", tmp_path / "a.ply", "--out", tmp_path / "b.ply")
+        assert (code, line["left_out_count"]) == (0, 5)
+        assert any("Floaters left out" in notice for notice in line["notices"])
+        found = core.read_splats(tmp_path / "b.ply")
+        assert found.file.columns["lb_area"].sum() == pytest.approx(4.0 * np.pi, rel=0.01)
+        code, [line] = run(
+            "thin-out", tmp_path / "b.ply", "--by", "number", "--count", 200, "--out", tmp_path / "c.ply"
+        )
+        assert (code, len(core.read_splats(tmp_path / "c.ply"))) == (0, line["points"])
+        code, [line] = run("analyze", tmp_path / "a.ply", "--out", tmp_path / "c.csv")
+        assert (code, "Splats cannot be written" in line["error"]) == (1, True)
+
+
+def test_broken_files_give_an_error_and_the_others_go_on(run, tmp_path):
+    (tmp_path / "a.ply").write_bytes(b"nothing")
+    write(tmp_path / "b.ply", SPHERE)
+    code, lines = run("info", tmp_path / "a.ply", tmp_path / "b.ply", tmp_path / "c.ply")
+    assert code == 1
+    assert [line.keys() >= {"error"} for line in lines] == [True, False, True]
+    assert str(tmp_path / "a.ply") in lines[0]["error"]
+
+
+@pytest.mark.parametrize("verb", [verb.name for verb in verbs.make_verbs()])
+def test_every_verb_explains_itself(run, verb, capsys):
+    assert run_command([verb, "--help"], verbs.make_verbs(), "meshfree") == 0
+    shown = capsys.readouterr().out
+    assert shown.startswith(f"usage: meshfree {verb} ")
+    assert "JSON line" in " ".join(shown.split())
+    assert run(verb, "--nonsense") == (2, [])
+
+
+def test_the_command_line_starts_without_scipy():
+    code = "import sys; from command import main, verbs; verbs.make_verbs(); print('scipy' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).parents[2], capture_output=True, text=True)
+    assert done.stdout == "False\n", done.stderr
