@@ -1,10 +1,10 @@
 """Work in blocks that fit the cache, on all cores: numpy and scipy let other threads run while they work on arrays."""
 
-import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
+from ..cores import cores
 from ..types import Report
 
 Part = TypeVar("Part")
@@ -40,7 +40,7 @@ def on_all_cores(
     if len(parts) < 2:
         return [function(part) for part in parts]
     results = []
-    with ThreadPoolExecutor(min(os.cpu_count() or 1, most or len(parts))) as pool:
+    with ThreadPoolExecutor(min(cores(), most or len(parts))) as pool:
         for result in pool.map(function, parts):
             results.append(result)
             report()

@@ -1,6 +1,5 @@
 """Few eigenpairs of many unknowns: on coarse versions of the matrix first, then by Davidson's method in a block."""
 
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -9,6 +8,7 @@ import numpy as np
 from scipy import sparse
 from scipy.linalg import eigh
 
+from ..cores import cores
 from ..types import Array, Floats
 from .blocks import blocks, on_all_cores
 from .dense import product, subtract_product
@@ -58,7 +58,7 @@ def coarse_to_fine(
     values, vectors : ndarray, (count,) and (n, count), or None
         Ascending, orthonormal.
     """
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(cores()) as pool:
         least = max(SMALL, 5 * count)
         levels, last, mass = build_levels(matrix, slowest, least, 3 * count, pool, report)
         if not levels or last.shape[0] > max(least, _DENSE):

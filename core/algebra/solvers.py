@@ -1,6 +1,5 @@
 """Conjugate gradients: for symmetric equations, and for symmetric quadratics with lower bounds."""
 
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -9,6 +8,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
+from ..cores import cores
 from ..errors import SolverError
 from ..types import Array, Floats, Progress
 from .hierarchy import PART, Rows, approximate_inverse
@@ -143,7 +143,7 @@ def solve_symmetric(
     columns = np.atleast_2d(load.T)
     values = np.zeros_like(columns) if start is None else np.atleast_2d(start.T).copy()
     scaling, products = 1.0 / matrix.diagonal(), _STEPS if len(load) < _FEW else _PLAIN
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(cores()) as pool:
         for number, column in enumerate(columns):
             # Squares of loads in tiny or huge units would underflow or overflow; a power of two rounds nothing.
             unit = np.ldexp(1.0, np.frexp(np.abs(column).max(initial=0.0))[1])
@@ -187,7 +187,7 @@ def solve_columns(matrix: sparse.csr_array, loads: Floats, rtol: float, report: 
     values, residual = np.zeros_like(loads), loads.copy()
     unit = np.linalg.norm(loads, axis=0)
     unit[unit == 0.0] = 1.0
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(cores()) as pool:
         rows = Rows(matrix, pool, lambda: report(0.0))
         inverse = approximate_inverse(matrix, pool, lambda: report(0.0))
         scaling = inverse or sparse.diags_array(1.0 / matrix.diagonal())

@@ -1,12 +1,12 @@
 """Equations on tangent vectors, solved as exactly where the solution is faint as where it is strong."""
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 import numpy as np
 from scipy import sparse
 
+from ..cores import cores
 from ..errors import SolverError
 from ..types import Array, Bools, Floats, Progress
 from .cholesky import factorize
@@ -50,7 +50,7 @@ class TwoGrid:
     def __init__(self, matrix: sparse.csr_array, mass: Floats, points: Floats, report: Progress) -> None:
         self._matrix, diagonal = matrix, matrix.diagonal().real
         count = len(mass)
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
+        with ThreadPoolExecutor(cores()) as pool:
 
             def rows(values: sparse.csr_array, fraction: float) -> Rows:
                 return Rows(values, pool, lambda: report("Equations", fraction))
@@ -100,7 +100,7 @@ class TwoGrid:
             No convergence.
         """
         result = self._coarse(load)
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
+        with ThreadPoolExecutor(cores()) as pool:
             for step in range(_STEPS):
                 matrix = Rows(self._matrix, pool, partial(report, "Directions", step / (step + 10.0)))
                 before = result

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 
 from ..algebra import nearest_rotations
 from ..arguments import check_array, check_finite, check_positions, check_switches, real
+from ..cores import cores
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import SMOOTH, check_points, read_surface
 from ..options import LaplacianOptions
@@ -504,7 +505,7 @@ def _pair_up(here: Floats, there: Floats, left: Floats, right: Floats, distance:
 
 def _closest(tree: cKDTree, places: Floats) -> tuple[Floats, Ints]:
     """Return distance and row of the closest point to each place; threads are worth it for many."""
-    return tree.query(places, workers=-1 if len(places) > _THREADED else 1)
+    return tree.query(places, workers=cores() if len(places) > _THREADED else 1)
 
 
 def _kernel(values: Floats, width: float) -> Floats:

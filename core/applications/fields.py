@@ -7,6 +7,7 @@ from scipy.spatial import cKDTree
 
 from ..algebra import solve_symmetric
 from ..arguments import as_array, as_doubles, check_array, check_finite
+from ..cores import cores
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import as_mask
 from ..kernel import SECOND_MOMENT
@@ -254,7 +255,7 @@ def _with_fixed_points(
     weights, own, load = _weights(laplacian, fixed, values)
     if thin.any() and laplacian.stiffness.nnz > _NARROW * np.count_nonzero(laplacian.component >= 0):
         report("Equations", 0.2)
-        distance = cKDTree(laplacian.points[thin]).query(laplacian.points, workers=-1)[0]
+        distance = cKDTree(laplacian.points[thin]).query(laplacian.points, workers=cores())[0]
         ramp = np.clip((distance / laplacian.smoothing_lengths - _NEAR[0]) / (_NEAR[1] - _NEAR[0]), 0.0, 1.0)
         wide = np.maximum(ramp**2 * (3.0 - 2.0 * ramp), _LEAST)
         narrow, narrow_own, narrow_load = _weights(narrow_laplacian(laplacian, _NARROW), fixed, values)
@@ -288,7 +289,7 @@ def _weights(laplacian: LaplaceBeltrami, fixed: Bools, values: Floats) -> tuple[
     nothing = np.zeros(count)
     if not fixed[boundary].any() or not laplacian.images.nnz:
         return weights.tocsr(), nothing, nothing
-    nearest = boundary[cKDTree(laplacian.points[boundary]).query(laplacian.points[near], workers=-1)[1]]
+    nearest = boundary[cKDTree(laplacian.points[boundary]).query(laplacian.points[near], workers=cores())[1]]
     chosen, c = np.zeros(count), np.zeros(count)
     chosen[near] = fixed[nearest]
     c[near] = values[nearest]

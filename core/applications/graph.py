@@ -7,6 +7,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from ..cores import cores
 from ..geometry import COUNT, nearest_rows
 from ..operator import LaplaceBeltrami
 from ..types import Array, Bools, Floats, Ints
@@ -64,7 +65,7 @@ def near_graph(laplacian: LaplaceBeltrami, count: int) -> NearGraph:
     points, component = laplacian.surface_points[first], laplacian.component[first]
 
     m = len(first)
-    distance, index = cKDTree(points).query(points, k=min(_SEEN * count + 1, m), workers=-1)
+    distance, index = cKDTree(points).query(points, k=min(_SEEN * count + 1, m), workers=cores())
     joined = _coupled(laplacian.stiffness, first, index)
     joined[:, 0] = False
     last = np.where(joined & (np.cumsum(joined, axis=1) <= count), distance, 0.0).max(axis=1)

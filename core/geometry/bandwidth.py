@@ -4,6 +4,7 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
+from ..cores import cores
 from ..kernel import SUPPORT
 from ..options import LaplacianOptions
 from ..types import Floats, Ints
@@ -123,13 +124,13 @@ def depth(nearest: Nearest, inside: Floats) -> Floats:
 
 def _neighbor_distance(tree: cKDTree, neighbors: int, component: Ints | None) -> Floats:
     # The tree counts a point as its own first neighbour.
-    distance: Floats = tree.query(tree.data, k=[min(neighbors + 1, tree.n)], workers=-1)[0][:, 0]
+    distance: Floats = tree.query(tree.data, k=[min(neighbors + 1, tree.n)], workers=cores())[0][:, 0]
     if component is not None:
         size = np.bincount(component)
         for small in np.flatnonzero(size <= neighbors):
             few = size[small] - 1
             rows = np.flatnonzero(component == small)
-            furthest = tree.query(tree.data[rows], k=[few + 1], workers=-1)[0][:, 0]
+            furthest = tree.query(tree.data[rows], k=[few + 1], workers=cores())[0][:, 0]
             distance[rows] = furthest * np.sqrt(neighbors / few)
     return distance
 

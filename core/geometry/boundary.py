@@ -7,6 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..algebra import blocks, inverses, on_all_cores
+from ..cores import cores
 from ..kernel import SUPPORT
 from ..types import Array, Bools, Floats, Ints
 from .components import label_connected
@@ -108,7 +109,7 @@ def find_boundary(nearest: Nearest, oriented: Floats, gaps: Floats) -> Bools:
     rows = rows[~_bends_away(nearest, oriented, rows)]
     ahead = _PROBE * gaps[rows]
     probe = points[rows] + ahead[:, None] * outward_directions(nearest, oriented, rows)
-    distance, next_one = nearest.tree.query(probe, workers=-1)
+    distance, next_one = nearest.tree.query(probe, workers=cores())
     # What is nearest there may be sparser: then the surface goes on, as sparse as that.
     rows = rows[distance > _EMPTY * np.maximum(ahead, _PROBE * gaps[next_one])]
     if len(rows) < FEWEST:
@@ -130,7 +131,7 @@ def _bends_away(nearest: Nearest, oriented: Floats, rows: Ints) -> Bools:
 
 def _label_courses(points: Floats, reach: Floats) -> Ints:
     """Number the boundaries that boundary points, (k, 3), lie on; those of one are within reach of each other."""
-    distance, other = cKDTree(points).query(points, k=min(NEXT + 1, len(points)), workers=-1)
+    distance, other = cKDTree(points).query(points, k=min(NEXT + 1, len(points)), workers=cores())
     return label_connected(other, distance <= reach[:, None])
 
 
@@ -172,7 +173,7 @@ def measure_boundary(nearest: Nearest, normals: Floats, at_boundary: Bools) -> B
         return boundary
     course = _fit_course(nearest, normals, rows)
     tree = cKDTree(nearest.points[rows])
-    span, view = tree.query(nearest.points, k=min(COUNT, len(rows)), workers=-1)
+    span, view = tree.query(nearest.points, k=min(COUNT, len(rows)), workers=cores())
     close = np.flatnonzero(span[:, 0] < reach)
 
     def measure(part: slice) -> None:
@@ -260,7 +261,7 @@ class _Course:
 
 def _fit_course(nearest: Nearest, normals: Floats, rows: Ints) -> _Course:
     points = nearest.points
-    distance, other = cKDTree(points[rows]).query(points[rows], k=min(COUNT, len(rows)), workers=-1)
+    distance, other = cKDTree(points[rows]).query(points[rows], k=min(COUNT, len(rows)), workers=cores())
     # A boundary that is given may be sparse, so that its courses are found without a reach.
     label = _label_courses(points[rows], np.full(len(rows), np.inf))
     fitted = np.clip(np.bincount(label)[label] // _PART, FEW, COUNT - 1)[:, None]

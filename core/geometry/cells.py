@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..algebra import blocks, on_all_cores
+from ..cores import cores
 from ..types import Bools, Floats, Ints, Report
 from .distances import arc_squared, bent_squared
 from .nearest import COUNT, Nearest
@@ -131,7 +132,7 @@ def _cuts(
         joined = np.ones(index.shape, dtype=bool)
     else:
         many = min(many, len(normals))
-        distance, index = nearest.tree.query(nearest.points[rows], k=many, workers=-1)
+        distance, index = nearest.tree.query(nearest.points[rows], k=many, workers=cores())
         counted = on_sheet(nearest, normals, rows, index, distance)[0]
         joined = component[index] == component[rows, None]
         counted &= joined

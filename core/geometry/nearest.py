@@ -9,6 +9,7 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
+from ..cores import cores
 from ..types import Bools, Floats, Ints
 from .quadrics import Quadrics, fit_quadrics
 
@@ -106,7 +107,7 @@ class Nearest:
         kept = np.ones(len(self.index), dtype=bool) if kept is None else kept
         rows, row = np.flatnonzero(changed[kept]), (np.cumsum(kept) - 1).astype(np.int32)
         tree, index, distance = cKDTree(points), row[self.index[kept]], self.distance[kept]
-        distance[rows], index[rows] = tree.query(points[rows], k=width, workers=-1)
+        distance[rows], index[rows] = tree.query(points[rows], k=width, workers=cores())
         result = Nearest(tree, index, distance, fading_weights(distance), self.in_row[kept] & ~changed[kept])
         if "quadrics" not in vars(self):
             return result
@@ -124,7 +125,7 @@ class Nearest:
 def find_nearest(points: Floats) -> Nearest:
     """Find the 40 nearest neighbours of every point, (m, 3)."""
     tree = cKDTree(points)
-    distance, index = tree.query(points, k=min(COUNT, len(points)), workers=-1)
+    distance, index = tree.query(points, k=min(COUNT, len(points)), workers=cores())
     return Nearest(tree, index.astype(np.int32), distance, fading_weights(distance), np.zeros(len(points), dtype=bool))
 
 

@@ -10,6 +10,7 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from ..algebra import on_all_cores
+from ..cores import cores
 from ..kernel import SUPPORT
 from ..types import Array, Bools, Floats, Ints, Report
 from .patches import Patch, divide_pairs
@@ -111,7 +112,7 @@ def find_pairs(tree: cKDTree, lengths: Floats, report: Report = lambda: None) ->
     """
     radii = SUPPORT * lengths
     # Counted first, which takes little, so that none is searched for in vain: points with as many are asked together.
-    count = tree.query_ball_point(tree.data, radii, workers=-1, return_length=True)
+    count = tree.query_ball_point(tree.data, radii, workers=cores(), return_length=True)
     group = np.ceil(np.log2(count) * _GROUPS).astype(np.int16)
     order = np.argsort(group, kind="stable")
     many, found = np.zeros(tree.n, dtype=np.int64), []
@@ -119,7 +120,7 @@ def find_pairs(tree: cKDTree, lengths: Floats, report: Report = lambda: None) ->
         most = int(count[members].max())
         for rows in np.array_split(members, len(members) * most // _BLOCK + 1):
             report()
-            distance, column = tree.query(tree.data[rows], k=np.arange(1, most + 1), workers=-1)
+            distance, column = tree.query(tree.data[rows], k=np.arange(1, most + 1), workers=cores())
             reach, other = radii[rows, None], radii[column]
             # A pair is kept by the end that reaches further, which always sees it.
             kept = (reach > other) | ((reach == other) & (rows[:, None] < column))

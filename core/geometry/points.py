@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..arguments import Shape, as_array, as_doubles, check_array, check_finite
+from ..cores import cores
 from ..errors import InvalidPointsError, NotASurfaceError, TooFewPointsError
 from ..types import Array, Bools, Floats, Ints
 
@@ -172,7 +173,7 @@ def _merge(points: Floats) -> tuple[Floats, Ints, Ints]:
     distinct, first, inverse = np.unique(points, axis=0, return_index=True, return_inverse=True)
     inverse = inverse.reshape(-1)
     while len(distinct) > 1:
-        distance, near = cKDTree(distinct).query(distinct, k=2, distance_upper_bound=_SAME, workers=-1)
+        distance, near = cKDTree(distinct).query(distinct, k=2, distance_upper_bound=_SAME, workers=cores())
         close = np.flatnonzero(np.isfinite(distance[:, 1]))
         if not len(close):
             break

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from ..arguments import whole
+from ..cores import cores
 from ..errors import InvalidPointsError
 from ..types import Array, Bools, Floats, Ints, Report
 from .points import check_points
@@ -119,7 +120,7 @@ def _thin(points: Floats, keys: Ints, count: int, report: Report) -> Bools:
     """Return which of the candidates stay when discs of one radius must not hold another, at most a count of them."""
     rank = _shuffled(keys)
     tree = cKDTree(points)
-    distance = tree.query(points[:: 1 + len(points) // _SAMPLE], k=min(_AROUND, len(points)), workers=-1)[0][:, -1]
+    distance = tree.query(points[:: 1 + len(points) // _SAMPLE], k=min(_AROUND, len(points)), workers=cores())[0][:, -1]
     area = len(points) * np.mean(np.pi * distance**2 / _AROUND)
     radius = np.sqrt(_DISCS * area / count)
     below, most, best = 0.0, np.inf, None  # radii that leave too many, and few enough

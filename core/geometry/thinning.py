@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..algebra import blocks
+from ..cores import cores
 from ..types import Bools, Floats, Ints, Report
 from .subset import independent
 
@@ -92,5 +93,5 @@ def nearest_in_blocks(
     count = min(count, len(sources))
     for rows in blocks(len(points), _BLOCK):
         report()
-        distance, index = tree.query(points[rows], k=range(1, count + 1), workers=-1)
+        distance, index = tree.query(points[rows], k=range(1, count + 1), workers=cores())
         yield rows.start, distance, index

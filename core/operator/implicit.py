@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..algebra import blocks, on_all_cores
+from ..cores import cores
 from ..geometry import SMOOTH, find_nearest
 from ..types import Array, Bools, Floats, Ints, Report
 
@@ -105,7 +106,7 @@ class ImplicitSurface:
 
     def nearest(self, places: Floats) -> Ints:
         """Return the number of the point that is nearest to each place, (k,) int."""
-        return self._tree.query(places, workers=-1)[1]
+        return self._tree.query(places, workers=cores())[1]
 
     def half_curvature(self, rows: Ints) -> Floats:
         """Return half the norm of the shape operator of some points, (k,): how fast the surface leaves their planes."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -14,6 +13,7 @@ from scipy.spatial import cKDTree
 
 from ..algebra import Rows, coarse_to_fine, lift_lowest
 from ..arguments import positive, whole
+from ..cores import cores
 from ..errors import SolverError, TooFewPointsError, UnresolvedModesError
 from ..kernel import inverse_ratio, symbol
 from ..memory import check_mode_memory
@@ -110,7 +110,7 @@ def _missed(matrix: sparse.csr_array, values: Floats, vectors: Floats) -> Floats
     def subtract(rows: slice, image: Floats) -> None:
         image -= vectors[rows] * values
 
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(cores()) as pool:
         missed = Rows(matrix, pool, lambda: None).product(vectors, subtract)
     return np.sqrt(np.einsum("ij,ij->j", missed, missed))
 

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from ..cores import cores
 from ..operator import LaplaceBeltrami
 
 
@@ -87,7 +88,7 @@ def check_stability(laplacian: LaplaceBeltrami) -> Stability:
     """
     known = np.flatnonzero(laplacian.component >= 0)
     distinct, first = np.unique(laplacian.points[known], axis=0, return_index=True)
-    spacing = cKDTree(distinct).query(distinct, k=[min(7, len(distinct))], workers=-1)[0][:, 0]
+    spacing = cKDTree(distinct).query(distinct, k=[min(7, len(distinct))], workers=cores())[0][:, 0]
     stiffness, areas = laplacian.stiffness[known][:, known], laplacian.areas[known]
     largest = stiffness.diagonal().max()
     return Stability(

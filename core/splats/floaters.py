@@ -5,6 +5,7 @@ from scipy.spatial import cKDTree
 
 from ..algebra import blocks, on_all_cores
 from ..arguments import check_finite
+from ..cores import cores
 from ..errors import InvalidPointsError
 from ..types import Bools, Floats, Ints
 from .splats import Splats
@@ -74,7 +75,7 @@ def floating_rows(splats: Splats) -> Ints:
 def _gaps(positions: Floats, covariances: Floats) -> Floats:
     """Return the third of the Mahalanobis distances from each splat to its neighbors, (m,)."""
     result = np.empty(len(positions))
-    index = cKDTree(positions).query(positions, k=_NEIGHBORS + 1, workers=-1)[1][:, 1:]
+    index = cKDTree(positions).query(positions, k=_NEIGHBORS + 1, workers=cores())[1][:, 1:]
     # Flat ones have no inverse: a thickness of a millionth of the length is negligible.
     ridge = 1e-12 * np.trace(covariances, axis1=1, axis2=2) + np.finfo(float).tiny
     covariances = covariances + ridge[:, None, None] * np.eye(3)

@@ -1,6 +1,5 @@
 """Filters of functions on the points by frequency (section 4 of the paper, Figure 12)."""
 
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
@@ -17,6 +16,7 @@ from ...algebra import (
     largest_eigenvalue,
 )
 from ...arguments import as_doubles, check_array, check_finite, check_switches, not_negative, real, whole
+from ...cores import cores
 from ...errors import PointCloudError
 from ...geometry import check_values
 from ...kernel import SECOND_MOMENT
@@ -278,7 +278,7 @@ def chebyshev_filter(
     report_done()
     columns = values.reshape(len(values), -1)
     filtered = respond(response, np.zeros(1))[0] * columns
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(cores()) as pool:
         order, root, multiply = corrected_operator(laplacian, dirichlet, raw, pool, report_done)
         top = largest_eigenvalue(lambda y: multiply(y[:, None])[:, 0], len(order))
         coefficients = _polynomial(response, top, largest)

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from ...arguments import check_switches, real, whole
+from ...cores import cores
 from ...errors import InvalidPointsError, PointCloudError
 from ...geometry import check_points, independent, nearest_in_blocks
 from ...types import Bools, Floats, Ints, Progress, Report
@@ -150,7 +151,7 @@ def _discs(points: Floats, order: Ints, area: float, distance: float, report: Re
     while len(left):
         chosen = np.append(chosen, _by_passes(points, left, order, area, distance, report))
         report()
-        left = left[cKDTree(points[chosen]).query(points[left], workers=-1)[0] >= distance]
+        left = left[cKDTree(points[chosen]).query(points[left], workers=cores())[0] >= distance]
     return np.sort(chosen)
 
 

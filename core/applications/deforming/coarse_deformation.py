@@ -9,6 +9,7 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from ...arguments import check_positions, check_switches, whole
+from ...cores import cores
 from ...errors import PointCloudError
 from ...geometry import balanced_weights, move_apart, nearest_in_blocks, thin
 from ...operator import LaplaceBeltrami, narrow_laplacian
@@ -246,7 +247,7 @@ def _closer_to_border(points: Floats, areas: Floats, held: Bools, count: int) ->
     """Return factors of the distances between chosen points, smaller near the border of constrained sets."""
     away = np.empty(len(points))
     for own in (held, ~held):
-        away[own] = cKDTree(points[~own]).query(points[own], workers=-1)[0]
+        away[own] = cKDTree(points[~own]).query(points[own], workers=cores())[0]
     return np.clip(away / (_NEAR * np.sqrt(areas.sum() / count)), _CLOSER, 1.0)
 
 

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from ...arguments import as_array, as_doubles, check_array, check_positions
+from ...cores import cores
 from ...errors import InvalidPointsError
 from ...geometry import Prolongation
 from ...operator import LaplaceBeltrami
@@ -104,7 +105,7 @@ def _around(laplacian: LaplaceBeltrami, corners: Floats) -> Array:
     """Return the points of the surface around each corner, (k, w) int."""
     kept = np.flatnonzero(laplacian.component >= 0)
     tree = cKDTree(laplacian.points[kept])
-    found = tree.query(corners, k=np.arange(1, min(_NEAR, len(kept)) + 1), workers=-1)[1]
+    found = tree.query(corners, k=np.arange(1, min(_NEAR, len(kept)) + 1), workers=cores())[1]
     return kept[found]
 
 

@@ -6,6 +6,7 @@ from scipy.spatial import cKDTree
 
 from ...algebra import blocks, on_all_cores
 from ...arguments import as_array, as_doubles, check_array, check_positions
+from ...cores import cores
 from ...geometry import Discs, frames
 from ...types import Floats
 from ..deforming.gradients import lifted_inverse
@@ -64,7 +65,7 @@ class Slopes:
         self._points -= self._points.mean(axis=0) if len(self._points) else 0.0
         self._discs = discs
         found = range(1, min(_COUNT, max(len(self._points) - 1, 0)) + 2)  # the point itself first
-        self._near = cKDTree(self._points).query(self._points, k=found, workers=-1)[1].astype(np.int32)
+        self._near = cKDTree(self._points).query(self._points, k=found, workers=cores())[1].astype(np.int32)
 
     def of(self, values: ArrayLike) -> Floats:
         """Return the slopes of values, (n,), as vectors in the tangent planes, (n, 3) [1/L].

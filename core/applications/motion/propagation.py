@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
@@ -21,6 +20,7 @@ from ...algebra import (
     factorize,
     largest_eigenvalue,
 )
+from ...cores import cores
 from ...errors import InvalidPointsError
 from ...geometry import check_values
 from ...operator import LaplaceBeltrami, symmetric_form
@@ -116,7 +116,7 @@ class Propagator:
         """Return the sum of Chebyshev polynomials of rows, (k, m), each times its weight, a number or (k, k)."""
         report, done = progress or _silent, 0.0
         result = np.zeros_like(rows)
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
+        with ThreadPoolExecutor(cores()) as pool:
             matrix = Rows(self._matrix, pool, lambda: report("Step", done))
 
             def product(values: Floats) -> Floats:

@@ -7,6 +7,7 @@ from scipy import fft
 from scipy.ndimage import map_coordinates
 
 from ...algebra import blocks
+from ...cores import cores
 from ...operator import LaplaceBeltrami
 from ...types import Bools, Floats, Report
 
@@ -53,10 +54,10 @@ class Inside:
         total, squared = np.zeros((), dtype=complex), np.zeros(())
         for part, wave in zip(flux, waves, strict=True):
             report()
-            total = total + 1j * wave * fft.rfftn(part, workers=-1)
+            total = total + 1j * wave * fft.rfftn(part, workers=cores())
             squared = squared + wave**2
         squared[0, 0, 0] = 1.0
-        field = fft.irfftn(total / squared, s=shape, workers=-1)
+        field = fft.irfftn(total / squared, s=shape, workers=cores())
         border = np.concatenate([np.take(field, 0, axis=axis).ravel() for axis in range(3)])
         self._winding = (field - border.mean()).astype(np.float32)
 

@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from ...algebra import blocks, on_all_cores
 from ...arguments import positive
+from ...cores import cores
 from ...errors import NotEnoughMemoryError, PointCloudError
 from ...geometry import Prolongation, check_points
 from ...memory import available_memory
@@ -277,7 +278,7 @@ def _bare(surface: ImplicitSurface, cut: Floats) -> float:
     """Return the share of points without a cut near them, which get no mesh."""
     if not len(cut):
         return 1.0
-    apart = cKDTree(cut).query(surface.points, distance_upper_bound=_COVERED, workers=-1)[0]
+    apart = cKDTree(cut).query(surface.points, distance_upper_bound=_COVERED, workers=cores())[0]
     return np.mean(np.isinf(apart))
 
 

@@ -1,0 +1,62 @@
+"""How many cores are used: those that a scheduler, a container or the user gives, wherever core works side by side."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import core
+from core.cores import VARIABLE, _container_cores, cores
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(autouse=True)
+def unset(monkeypatch):
+    monkeypatch.delenv(VARIABLE, raising=False)
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="this system has no affinity")
+def test_those_of_the_affinity():
+    narrow = "import os; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})"
+    code = f"{narrow}; from core.cores import cores; print(cores())"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout == "1\n"
+
+
+def test_those_of_the_machine_where_there_is_no_affinity(monkeypatch):
+    monkeypatch.delattr(os, "sched_getaffinity", raising=False)
+    monkeypatch.setattr(os, "cpu_count", lambda: 1)
+    assert cores() == 1
+    monkeypatch.setattr(os, "cpu_count", lambda: None)
+    assert cores() == 1
+
+
+def test_those_of_the_variable(monkeypatch):
+    monkeypatch.setenv(VARIABLE, "7")
+    assert cores() == 7
+
+
+@pytest.mark.parametrize("text", ["two", "0", "-1", "1.5"])
+def test_a_variable_that_is_no_number_is_told(monkeypatch, text):
+    monkeypatch.setenv(VARIABLE, text)
+    with pytest.raises(core.PointCloudError, match=f"{VARIABLE} is '{text}'. Let it be a whole number"):
+        core.build_laplacian(core.example_sphere())
+
+
+@pytest.mark.parametrize(
+    ("limit", "count"), [("max 100000", None), ("200000 100000", 2), ("150000 100000", 2), ("5000 100000", 1)]
+)
+def test_those_of_a_container(tmp_path, limit, count):
+    assert _container_cores(tmp_path) is None
+    (tmp_path / "cpu.max").write_text(f"{limit}\n")
+    assert _container_cores(tmp_path) == count
+
+
+def test_nothing_in_core_counts_for_itself():
+    wrong = re.compile(r"cpu_count|workers=-1|ThreadPoolExecutor\(\)")
+    files = [path for path in (ROOT / "core").rglob("*.py") if wrong.search(path.read_text(encoding="utf-8"))]
+    assert [path.name for path in files] == ["cores.py"]
