@@ -1,12 +1,18 @@
 """The command line: from files to files, by verbs."""
 
 import argparse
+import errno
 import json
 import sys
-from pathlib import Path
+from time import perf_counter
 
 from . import core
+from .inputs import add_files, find_inputs, output_path, outputs_of, read_files
+from .records import Records, add_report, check_report
 from .verbs import make_verbs
+
+DONE, FAILED, WRONG_USAGE, ELSEWHERE = 0, 1, 2, 3  # exit codes
+_SCARCE = {errno.ENOMEM, errno.ENOSPC, errno.EDQUOT}  # of errors that another machine may not have
 
 
 def main() -> int:
@@ -28,21 +34,43 @@ def run(argv, verbs, program) -> int:
     Returns
     -------
     int
-        Exit code: 0 if all files succeeded, 1 if any failed, 2 for wrong usage.
+        Exit code: 0 if all files succeeded, or their errors are in the report that was asked for; 1 if any failed
+        without a report; 2 for wrong usage; 3 if memory or disk were not enough, so that another machine may do it.
     """
     try:
         verb, arguments = _parse(argv, verbs, program)
     except SystemExit as stop:  # from argparse after --help and wrong usage
-        return stop.code or 0
-    failed = False
+        return stop.code or DONE
+    records, code = Records(verb, arguments), DONE
     for path in arguments.inputs:
+        if records.holds(path):
+            print(json.dumps({"file": str(path), "skipped": True}), flush=True)
+            continue
+        began, read = perf_counter(), records.read_stamps(path)
         try:
             result = _process(verb, path, arguments)
-        except (core.PointCloudError, OSError, RuntimeError) as error:  # Blender's importers raise RuntimeError
-            failed = True
-            result = {"error": str(error).strip().removeprefix("Error: ")}  # the prefix of reported errors
-        print(json.dumps({"file": str(path), **result}), flush=True)
-    return 1 if failed else 0
+        except (core.PointCloudError, OSError, RuntimeError, MemoryError) as error:  # Blender raises RuntimeError
+            result = {"error": _text(error)}
+            told = DONE if arguments.report is not None else FAILED
+            code = max(code, ELSEWHERE if _is_scarcity(error) else told)
+        line = {"file": str(path), **result}
+        records.keep(path, line, perf_counter() - began, read)
+        print(json.dumps(line), flush=True)
+    return code
+
+
+def _text(error):
+    """Return the text of an error, without the prefix of those that Blender reports."""
+    return str(error).strip().removeprefix("Error: ") or type(error).__name__
+
+
+def _is_scarcity(error) -> bool:
+    """Whether an error, or its cause, is a want of memory or disk."""
+    while error is not None:
+        if isinstance(error, (core.NotEnoughMemoryError, MemoryError)) or getattr(error, "errno", None) in _SCARCE:
+            return True
+        error = error.__cause__
+    return False
 
 
 def _parse(argv, verbs, program):
@@ -52,62 +80,23 @@ def _parse(argv, verbs, program):
     parsers = {}
     for verb in verbs:
         parsers[verb.name] = commands.add_parser(verb.name, help=verb.help, description=verb.description)
-        _add_files(parsers[verb.name], verb)
+        add_files(parsers[verb.name], verb)
+        add_report(parsers[verb.name])
         verb.add_options(parsers[verb.name])
     arguments = parser.parse_args(argv)
     chosen = parsers[arguments.command]
     verb = next(verb for verb in verbs if verb.name == arguments.command)
-    if arguments.out is not None and arguments.out.suffix.lower() not in verb.outputs:
-        chosen.error(f"--out must end in {', '.join(verb.outputs)}")
+    check_report(chosen, arguments)
+    find_inputs(chosen, verb, arguments)
     verb.check(chosen, arguments)
-    try:
-        arguments.inputs = [file for path in arguments.inputs for file in _frames(path)]
-    except core.PointCloudError as error:
-        chosen.error(str(error))
-    if arguments.out is not None and len(arguments.inputs) > 1:
-        chosen.error("--out takes one input; use --out-dir for many")
-    outputs = [path for one in arguments.inputs for path in _outputs(verb, one, arguments)]
-    if arguments.out_dir is not None and len(set(outputs)) < len(outputs):
-        chosen.error("some inputs have the same name and would overwrite each other in --out-dir")
     return verb, arguments
-
-
-def _add_files(parser, verb):
-    """Add the inputs and outputs of a verb."""
-    parser.add_argument(
-        "inputs", nargs="+", type=Path, metavar="IN", help=f"{verb.inputs}; or folders of numbered ones"
-    )
-    parser.set_defaults(out=None, out_dir=None)
-    if verb.outputs:
-        target = parser.add_mutually_exclusive_group()
-        target.add_argument("--out", type=Path, metavar="FILE", help=f"output of one input: {', '.join(verb.outputs)}")
-        target.add_argument("--out-dir", type=Path, metavar="DIR", help="folder for the outputs of all inputs")
-        endings = [suffix[1:] for suffix in verb.outputs]
-        parser.add_argument("--format", choices=endings, default=endings[0], help="outputs in the folder")
-
-
-def _frames(path):
-    """Return the numbered files of a folder, or the file itself."""
-    return core.files.numbered_files(path) if path.is_dir() else [path]
-
-
-def _output_path(path, arguments):
-    if arguments.out_dir is not None:
-        return arguments.out_dir / f"{path.stem}.{arguments.format}"
-    return arguments.out
-
-
-def _outputs(verb, path, arguments):
-    """Return the paths of all files that are written for an input."""
-    output = _output_path(path, arguments)
-    return [] if output is None else [output, *verb.beside(output, arguments)]
 
 
 def _process(verb, path, arguments) -> dict:
     """Process one file, write its output, and return what to print."""
-    output = _output_path(path, arguments)
-    for read in (path, *(Path(getattr(arguments, name)) for name in verb.reads)):
-        for written in _outputs(verb, path, arguments):
-            if written.resolve() == read.resolve():
-                raise core.PointCloudError(f"The output {written} would overwrite its input. Choose another name.")
+    output, written = output_path(path, arguments), outputs_of(verb, path, arguments)
+    for read in read_files(verb, path, arguments):
+        for one in written:
+            if one.resolve() == read.resolve():
+                raise core.PointCloudError(f"The output {one} would overwrite its input. Choose another name.")
     return {**verb.run(path, arguments, output), "output": None if output is None else str(output)}

@@ -1,5 +1,7 @@
 """A verb of the command line."""
 
+from .inputs import files_in
+
 ONE_LINE = "Writes one JSON line per input, with notices, or the error. The exit code is 1 if any input failed."
 
 
@@ -19,6 +21,10 @@ class Verb:
 
     def check(self, parser, arguments):
         """Refuse incompatible options, by `parser.error`."""
+
+    def expand(self, path, arguments) -> list:
+        """Return the files that an input stands for: those with points in a folder, or itself."""
+        return files_in(path) if path.is_dir() else [path]
 
     def beside(self, output, arguments) -> list:
         """Return the paths of further files that are written beside an output."""

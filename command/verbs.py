@@ -14,6 +14,7 @@ from .quantities import ORIENTATION, SEGMENT, STRAY, eigenvector_name, written_b
 from .rows import TABLES, write_rows
 from .settings import LAPLACIAN, Setting, add_setting, chosen, laplacian_options
 from .stages import ToldStages
+from .summary import Report
 from .verb import ONE_LINE, Verb
 
 
@@ -24,7 +25,7 @@ def make_verbs() -> list:
 
 def without_object() -> list:
     """Return new verbs that in Blender, too, need no object."""
-    return [Info(), Convert(), SplatInfo(), Deform()]
+    return [Info(), Convert(), SplatInfo(), Deform(), Report()]
 
 
 class CloudVerb(Verb):
@@ -128,7 +129,33 @@ class SurfaceVerb(CloudVerb):
         return built if sides is None else analysis.oriented(built, sides)
 
 
-class Analyze(SurfaceVerb):
+class Frames:
+    """A verb that takes its inputs as frames of a sequence, if the option `sequence` is given."""
+
+    def add_sequence(self, parser):
+        """Add the option."""
+        parser.add_argument(
+            "--sequence",
+            action="store_true",
+            help="the inputs are frames in their order: each mode continues one of the frame before, with its sign, so"
+            " that eigenvalues need not ascend; overlaps of the two are written, too",
+        )
+
+    def expand(self, path, arguments):
+        """Return the numbered files of a folder."""
+        if arguments.sequence and path.is_dir():
+            return core.files.numbered_files(path)
+        return super().expand(path, arguments)
+
+    def check_sequence(self, parser, arguments, modes):
+        """Refuse what does not go with a sequence, by `parser.error`."""
+        if arguments.sequence and not modes:
+            parser.error("--sequence matches modes: give --modes, too")
+        if arguments.sequence and (arguments.part != (1, 1) or arguments.skip_done):
+            parser.error("--sequence needs all frames, one after the other: leave --part and --skip-done out")
+
+
+class Analyze(Frames, SurfaceVerb):
     """The verb `analyze`, for single files or for the frames of a sequence."""
 
     name = "analyze"
@@ -140,11 +167,11 @@ class Analyze(SurfaceVerb):
     _earlier = None  # modes and points of the frame before
 
     def add_options(self, parser):
-        parser.add_argument("--sequence", action="store_true", help=SEQUENCE)
+        self.add_sequence(parser)
         super().add_options(parser)
 
     def check(self, parser, arguments):
-        check_sequence(parser, arguments, chosen(self.settings, arguments)["modes"])
+        self.check_sequence(parser, arguments, chosen(self.settings, arguments)["modes"])
 
     def work(self, path, given, arguments, output, progress):
         cloud, own = clouds.Cloud(path, given, floaters(arguments)), chosen(self.settings, arguments)
@@ -164,18 +191,6 @@ class Analyze(SurfaceVerb):
             everything = analysis.arrays(cloud.place, built, spectrum) if output.suffix.lower() == ".npz" else None
             written = clouds.write(output, given, {**measures, **modes}, everything)
         return {**analysis.figures(measures, spectrum), **matched}, [*laplacian.notices, *notices, *written]
-
-
-SEQUENCE = (
-    "the inputs are frames in their order: each mode continues one of the frame before, with its sign, so that"
-    " eigenvalues need not ascend; overlaps of the two are written, too"
-)
-
-
-def check_sequence(parser, arguments, modes):
-    """Refuse to match the modes of frames, if there are none."""
-    if arguments.sequence and not modes:
-        parser.error("--sequence matches modes: give --modes, too")
 
 
 def floaters(arguments) -> bool:

@@ -99,7 +99,7 @@ def _names_group(setting):
     return setting == "group" or setting.endswith("_group")
 
 
-class Analyze(ObjectVerb):
+class Analyze(verbs.Frames, ObjectVerb):
     """The verb `analyze`, for single files or for the frames of a sequence."""
 
     def __init__(self):
@@ -115,12 +115,12 @@ class Analyze(ObjectVerb):
     def add_options(self, parser):
         for setting in verbs.Analyze.settings:
             add_setting(parser, setting)
-        parser.add_argument("--sequence", action="store_true", help=verbs.SEQUENCE)
+        self.add_sequence(parser)
         super().add_options(parser)
 
     def check(self, parser, arguments):
         vars(arguments).update(chosen(verbs.Analyze.settings, arguments))
-        verbs.check_sequence(parser, arguments, arguments.modes)
+        self.check_sequence(parser, arguments, arguments.modes)
 
     def work(self, obj, path, arguments, output):
         check_writable(obj, analysis_names(min(arguments.modes, arguments.write_limit)), obj.meshfree.make_single_user)

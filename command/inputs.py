@@ -1,0 +1,113 @@
+"""Which files a command line reads and writes."""
+
+import argparse
+import re
+import sys
+from pathlib import Path
+
+from . import core
+
+
+def add_files(parser, verb):
+    """Add the options for the inputs and outputs of a verb."""
+    parser.add_argument(
+        "inputs", nargs="*", type=Path, metavar="IN", help=f"{verb.inputs}; or folders of such, in the order of numbers"
+    )
+    parser.add_argument(
+        "--files-from", metavar="LIST", help="file with the names of further inputs, one a line; - for standard input"
+    )
+    parser.add_argument(
+        "--part",
+        type=_part,
+        default=(1, 1),
+        metavar="K/N",
+        help="process the K-th of N equal shares of the inputs only: every N-th file from the K-th on",
+    )
+    parser.set_defaults(out=None, out_dir=None)
+    if verb.outputs:
+        target = parser.add_mutually_exclusive_group()
+        target.add_argument("--out", type=Path, metavar="FILE", help=f"output of one input: {', '.join(verb.outputs)}")
+        target.add_argument("--out-dir", type=Path, metavar="DIR", help="folder for the outputs of all inputs")
+        endings = [suffix[1:] for suffix in verb.outputs]
+        parser.add_argument("--format", choices=endings, default=endings[0], help="outputs in the folder")
+
+
+def _part(text):
+    """Parse K/N."""
+    match = re.fullmatch(r"(\d+)/(\d+)", text, re.ASCII)
+    number, count = map(int, match.groups()) if match else (0, 0)
+    if not 1 <= number <= count:
+        raise argparse.ArgumentTypeError(f"{text!r} is not K/N, such as 1/4, with K from 1 to N")
+    return number, count
+
+
+def find_inputs(parser, verb, arguments):
+    """Set the inputs to the files of this share, and refuse those that cannot be processed, by `parser.error`."""
+    if arguments.out is not None and arguments.out.suffix.lower() not in verb.outputs:
+        parser.error(f"--out must end in {', '.join(verb.outputs)}")
+    try:
+        given = [*arguments.inputs, *_listed(arguments.files_from)]
+        if not given:
+            parser.error("nothing says what to read: name files, or a list of them by --files-from")
+        files = [file for path in given for file in verb.expand(path, arguments)]
+    except core.PointCloudError as error:
+        parser.error(str(error))
+    if arguments.out is not None and len(files) > 1:
+        parser.error("--out takes one input; use --out-dir for many")
+    written = [path for one in files for path in outputs_of(verb, one, arguments)]
+    if arguments.out_dir is not None and len(set(written)) < len(written):
+        parser.error("some inputs have the same name and would overwrite each other in --out-dir")
+    number, count = arguments.part
+    arguments.inputs = files[number - 1 :: count]
+
+
+def _listed(source):
+    """Return the paths in a list; none without one."""
+    if source is None:
+        return []
+    try:
+        text = sys.stdin.read() if source == "-" else Path(source).read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise core.PointCloudError(f"The list {source} cannot be read: {error}. Check its name.") from error
+    return [Path(line.strip()) for line in text.splitlines() if line.strip()]
+
+
+def files_in(folder):
+    """Return all files with points in a folder, in the order of the numbers in their names."""
+    try:
+        paths = [path for path in folder.iterdir() if path.suffix.lower() in _READ and path.is_file()]
+    except OSError as error:
+        raise core.PointCloudError(
+            f"The folder {folder} cannot be read: {error.strerror or error}. Check it."
+        ) from error
+    if not paths:
+        raise core.PointCloudError(f"{folder} has no files with points. Name one with files of {', '.join(_READ)}.")
+    return sorted(paths, key=lambda path: _natural(path.name))
+
+
+_READ = (*core.files.READABLE, *core.files.SPLATS)
+
+
+def _natural(name):
+    """Return a key by which names are in the order of the numbers in them."""
+    parts = re.split(r"(\d+)", name.lower(), flags=re.ASCII)
+    return [int(part) if index % 2 else part for index, part in enumerate(parts)]
+
+
+def output_path(path, arguments):
+    """Return the path of the main output of an input, or None."""
+    if arguments.out_dir is not None:
+        return arguments.out_dir / f"{path.stem}.{arguments.format}"
+    return arguments.out
+
+
+def outputs_of(verb, path, arguments) -> list:
+    """Return the paths of all files that are written for an input."""
+    output = output_path(path, arguments)
+    return [] if output is None else [output, *verb.beside(output, arguments)]
+
+
+def read_files(verb, path, arguments) -> list:
+    """Return the paths of all files that are read for an input."""
+    others = (getattr(arguments, name) for name in verb.reads)
+    return [path, *map(Path, filter(None, others))]

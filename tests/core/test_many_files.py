@@ -1,0 +1,225 @@
+"""Many files on the command line: lists, shares, reports, what need not be done again, and exit codes."""
+
+import errno
+import io
+import json
+import sys
+
+import numpy as np
+import pytest
+
+import core
+from benchmarks.samplings import fibonacci_sphere
+from command import records, verbs
+from command.main import run as run_command
+
+POINTS = fibonacci_sphere(200)
+
+
+@pytest.fixture
+def run(capsys):
+    """Run the command line; return the exit code and the JSON lines."""
+
+    def run(*arguments):
+        code = run_command([str(argument) for argument in arguments], verbs.make_verbs(), "meshfree")
+        return code, [json.loads(line) for line in capsys.readouterr().out.splitlines() if line.startswith("{")]
+
+    return run
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder with eight clouds of a delivery, one of them broken."""
+    (tmp_path / "in").mkdir()
+    for number in range(8):
+        np.save(tmp_path / "in" / f"LHD_{650 + number % 2}_{9 + number}.npy", (1.0 + number) * POINTS)
+    (tmp_path / "in" / "LHD_651_12.npy").write_bytes(b"nothing")
+    return tmp_path
+
+
+def names(lines):
+    return [line["file"].rpartition("/")[2] for line in lines]
+
+
+class TestInputs:
+    def test_a_folder_stands_for_all_its_files_in_the_order_of_numbers(self, run, folder):
+        (folder / "in" / "notes.pdf").write_text("no points")
+        _, lines = run("info", folder / "in")
+        assert names(lines) == [
+            f"LHD_{group}_{n}.npy" for group in (650, 651) for n in range(9, 17) if n % 2 == 651 - group
+        ]
+        (folder / "empty").mkdir()
+        assert run("info", folder / "empty") == (2, [])
+
+    def test_a_list_in_a_file_or_from_standard_input(self, run, folder, monkeypatch):
+        wanted = [folder / "in" / name for name in ("LHD_650_11.npy", "LHD_651_10.npy")]
+        text = f"{wanted[0]}\n\n  {wanted[1]}  \n"
+        (folder / "list.txt").write_text(text, encoding="utf-8-sig")
+        assert names(run("info", "--files-from", folder / "list.txt")[1]) == ["LHD_650_11.npy", "LHD_651_10.npy"]
+        monkeypatch.setattr(sys, "stdin", io.StringIO(text))
+        assert len(run("info", folder / "in" / "LHD_650_9.npy", "--files-from", "-")[1]) == 3
+
+    @pytest.mark.parametrize("count", [1, 3, 8, 11])
+    def test_shares_are_equal_and_hold_each_file_once(self, run, folder, count):
+        shares = [names(run("info", folder / "in", "--part", f"{k}/{count}")[1]) for k in range(1, count + 1)]
+        assert sorted(name for share in shares for name in share) == sorted(names(run("info", folder / "in")[1]))
+        assert max(map(len, shares)) - min(map(len, shares)) <= 1
+
+    @pytest.mark.parametrize(
+        "arguments",
+        [
+            (),
+            ("--files-from", "none.txt"),
+            ("a.npy", "--part", "0/4"),
+            ("a.npy", "--part", "5/4"),
+            ("a.npy", "--part", "1"),
+            ("a.npy", "--skip-done"),
+            ("a.npy", "--report", "a.txt"),
+        ],
+        ids=" ".join,
+    )
+    def test_wrong_usage(self, run, arguments):
+        assert run("info", *arguments) == (2, [])
+
+    def test_frames_are_not_divided(self, run, folder):
+        assert run("analyze", "--sequence", folder / "in", "--modes", 3)[0] == 2  # of two names
+        assert run("analyze", "--sequence", folder / "in" / "LHD_650_9.npy", "--modes", 3, "--part", "1/2")[0] == 2
+
+    def test_outputs_of_other_shares_count_too(self, run, folder):
+        (folder / "other").mkdir()
+        np.save(folder / "other" / "LHD_650_9.npy", POINTS)
+        files = folder / "in" / "LHD_650_9.npy", folder / "other" / "LHD_650_9.npy"
+        assert run("convert", *files, "--part", "1/2", "--out-dir", folder / "out")[0] == 2
+
+
+class TestReports:
+    def thin(self, run, folder, *options, source="in"):
+        given = "--by", "number", "--count", 50, "--out-dir", folder / "out", "--report", folder / "r" / "1.jsonl"
+        return run("thin-out", folder / source, *given, *options)
+
+    def test_errors_in_the_report_are_no_failure(self, run, folder):
+        code, lines = self.thin(run, folder)
+        assert (code, ["error" in line for line in lines].count(True)) == (0, 1)
+        assert run("info", folder / "in")[0] == 1
+        kept = [json.loads(line) for line in (folder / "r" / "1.jsonl").read_text().splitlines()]
+        assert [record["file"] for record in kept] == [line["file"] for line in lines]
+        assert all(record["settings"]["count"] == 50 and record["elapsed"] >= 0.0 for record in kept)
+
+    def test_what_is_done_is_left_out(self, run, folder):
+        self.thin(run, folder)
+        before = {path: path.stat().st_mtime_ns for path in (folder / "out").iterdir()}
+        code, lines = self.thin(run, folder, "--skip-done")
+        assert (code, [line.get("skipped", False) for line in lines].count(True)) == (0, 7)
+        assert [line["file"] for line in lines if "error" in line] == [str(folder / "in" / "LHD_651_12.npy")]
+        assert {path: path.stat().st_mtime_ns for path in (folder / "out").iterdir()} == before
+
+    @pytest.mark.parametrize("change", ["input", "output", "no output", "settings", "folder", "verb"])
+    def test_what_has_changed_is_done_again(self, run, folder, change):
+        self.thin(run, folder)
+        inputs, outputs = folder / "in" / "LHD_650_9.npy", folder / "out" / "LHD_650_9.ply"
+        options, again = [], {str(inputs)}
+        if change == "input":
+            np.save(inputs, 3.0 * POINTS)
+        elif change == "output":
+            outputs.write_bytes(outputs.read_bytes() + b"\n")
+        elif change == "no output":
+            outputs.unlink()
+        elif change == "settings":
+            options, again = ["--count", 40], None
+        elif change == "folder":
+            options, again = ["--out-dir", folder / "new"], None
+        if change == "verb":
+            given = "--out-dir", folder / "out", "--report", folder / "r" / "1.jsonl", "--skip-done"
+            code, lines = run("convert", folder / "in", *given)
+            again = None
+        else:
+            code, lines = self.thin(run, folder, "--skip-done", *options)
+        done = {line["file"] for line in lines if "skipped" not in line and "error" not in line}
+        assert code == 0
+        assert done == again if again else len(done) == 7
+
+    def test_a_share_knows_what_others_have_done(self, run, folder):
+        for k in (1, 2):
+            self.thin(run, folder, "--part", f"{k}/2", "--report", folder / "r" / f"{k}.jsonl")
+        lines = [self.thin(run, folder, "--part", f"{k}/3", "--skip-done")[1] for k in (1, 2, 3)]
+        assert sum(line.get("skipped", False) for part in lines for line in part) == 7
+
+    def test_other_files_that_are_read_count_too(self, run, folder):
+        body = POINTS * [1.0, 0.8, 0.5]
+        for name in ("a", "plan"):
+            np.save(folder / f"{name}.npy", body)
+        given = "align", folder / "a.npy", "--reference", folder / "plan.npy", "--report", folder / "r.jsonl"
+        assert "skipped" not in run(*given)[1][0]
+        assert run(*given, "--skip-done")[1] == [{"file": str(folder / "a.npy"), "skipped": True}]
+        np.save(folder / "plan.npy", body + 0.01)
+        assert "skipped" not in run(*given, "--skip-done")[1][0]
+
+    def test_a_writer_that_was_killed_leaves_all_but_its_last_line(self, run, folder):
+        self.thin(run, folder)
+        report = folder / "r" / "1.jsonl"
+        lines = report.read_bytes().splitlines(keepends=True)
+        report.write_bytes(b"".join(lines[:3]) + lines[3][:40])
+        _, printed = self.thin(run, folder, "--skip-done")
+        assert [line.get("skipped", False) for line in printed[:3]] == [True] * 3
+        found, broken = records.read_reports(folder / "r")
+        assert (len(found), broken) == (8, 1)
+        code, [line] = run("report", folder / "r")
+        assert (code, line["files"], "1 lines are no records" in line["notices"][0]) == (0, 8, True)
+
+    def test_reports_are_merged_with_totals_and_errors(self, run, folder):
+        for k in (1, 2):
+            options = "--no-volume", "--part", f"{k}/2", "--report", folder / "r" / f"{k}.jsonl"
+            assert run("measure", folder / "in", *options)[0] == 0
+        code, [line] = run("report", folder / "r", "--out", folder / "table.csv")
+        assert code == 0
+        assert (line["files"], line["failed"], line["points"]) == (8, 1, 1400)
+        assert line["errors"][0]["path"] == str(folder / "in" / "LHD_651_12.npy")
+        exact = 4.0 * np.pi * sum((1.0 + number) ** 2 for number in range(8) if number != 3)
+        assert line["total_area"] == pytest.approx(exact, rel=0.02)
+        rows = (folder / "table.csv").read_text().splitlines()
+        assert rows[0].startswith("path,verb,points,total_area,elapsed")
+        assert len(rows) == 10
+        assert rows[-1].startswith('"8 files, 1 failed"')
+        assert run("report", folder / "r", "--out", folder / "table.json")[0] == 0
+        merged = json.loads((folder / "table.json").read_text())
+        assert merged["totals"]["points"] == sum(record.get("points", 0) for record in merged["files"])
+        assert run("report", folder / "in")[0] == 1
+        assert run("report", folder / "none")[0] == 1
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (core.NotEnoughMemoryError("It does not fit."), 3),
+        (MemoryError(), 3),
+        (OSError(errno.ENOSPC, "No space left on device"), 3),
+        (OSError(errno.EACCES, "Permission denied"), 0),
+        (core.PointCloudError("It is no surface."), 0),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+@pytest.mark.parametrize("wrapped", [False, True])
+def test_what_another_machine_may_do_has_an_exit_code_of_its_own(run, folder, monkeypatch, error, code, wrapped):
+    def fail(*_):
+        if wrapped:
+            raise core.PointCloudError("It failed.") from error
+        raise error
+
+    monkeypatch.setattr(verbs.Info, "work", fail)
+    given = "info", folder / "in" / "LHD_650_9.npy", folder / "in" / "LHD_650_11.npy"
+    found, lines = run(*given, "--report", folder / "r.jsonl")
+    assert (found, len(lines)) == (code, 2)
+    assert all(line["error"] for line in lines)
+    assert run(*given)[0] == (code or 1)
+
+
+def test_a_full_disk_is_told_as_one(run, folder, monkeypatch):
+    """Through the writer of files, which gives it a text of its own."""
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("os.replace", full)
+    code, [line] = run("convert", folder / "in" / "LHD_650_9.npy", "--out", folder / "a.ply")
+    assert (code, "No space left" in line["error"]) == (3, True)
+    assert not (folder / "a.ply").exists()
