@@ -9,15 +9,19 @@ PAGES = [ROOT / "README.md", *sorted(ROOT.glob("docs/**/*.md"))]
 _FENCED = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _INDENTED = re.compile(r"(?<=\n\n) {4}.*\n(?:\n* {4}.*\n)*")
 _INLINE = re.compile(r"(?<!`)`([^`\n]+)`(?!`)")
-_SHELL = r"(?:[A-Z_]+=\S+ )*(make|blender|python|pip) \S.*"
+_SHELL = r"(?:[A-Z_]+=\S+ )*(make|blender|python|pip|meshfree|openjd|bash) \S.*"
 _TYPED = re.compile(rf"{_SHELL}|bpy\.ops\.\w+\..*")
 
+FARM = "needs a scheduler; tests/wheel/test_farm.py runs it on other files"
 SLOW = "takes minutes to hours; test_pages.py of the core looks for the module"
 NOT_RUN = {
     "blender --command meshfree analyze IN [IN ...] --out FILE | --out-dir DIR [--modes N] [--format FORMAT]": "a form",
     "blender --command meshfree VERB IN [IN ...] --out FILE | --out-dir DIR [options] [--format FORMAT]": "a form",
     "bpy.ops.meshfree.<name>()": "stands for every operator",
     "blender -b FILE -a": "a form, of a command of Blender",
+    "blender --background --command meshfree": "a form",
+    "openjd run farm/openjd/template.yaml -p InputDir=/data/scans -p OutputDir=/data/out -p Parts=40": FARM,
+    "bash farm/slurm/meshfree.sh 40 analyze /data/scans /data/out --modes 10": FARM,
     "pip install laspy lazrs": "changes the environment, from the internet",
     "pip install open3d==0.19.0": "changes the environment, from the internet",
     "pip install open3d==0.20.0": "changes the environment, from the internet",
@@ -79,7 +83,7 @@ def _lines(commands):
 
 
 def _kind(text):
-    """What is typed: make, blender, python or pip in a shell, json, or Python with core, the wheel, or bpy."""
+    """What is typed: a program of a shell, json, or Python with core, the wheel, or bpy."""
     command = re.match(_SHELL, text)
     if command:
         return command[1]

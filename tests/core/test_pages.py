@@ -5,15 +5,19 @@ import re
 import shlex
 import shutil
 import subprocess
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from benchmarks.samplings import fibonacci_sphere
+from command import verbs
+from command.main import run
+from core.files import PointTable, write_points
 from tests.pages import NOT_RUN, ROOT, snippets, typed
 
 MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
-RUN = {"core", "make", "bpy", "blender", "json", "wheel"}  # by tests/blender/test_pages.py, and tests/wheel
+RUN = {"core", "make", "bpy", "blender", "json", "meshfree", "wheel"}  # by tests/blender/test_pages.py, and tests/wheel
 
 
 def by_name(kind):
@@ -29,6 +33,19 @@ def test_every_snippet_is_run_or_listed_and_every_listed_one_is_on_a_page():
 def test_code(snippet):
     points = fibonacci_sphere(800)
     exec(compile(snippet.text, snippet.id, "exec"), {"points": points, "values": points[:, 2], "np": np})
+
+
+@by_name("meshfree")
+def test_program(snippet, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    points = fibonacci_sphere(800)
+    for folder in ("scans", "thin/reports"):
+        Path(folder).mkdir(parents=True)
+    for name in ("scan.ply", "scans/a.ply", "scans/b.ply"):
+        write_points(Path(name), PointTable(points))
+    if " report " in snippet.text:
+        run(["info", "scan.ply", "--report", "thin/reports/1.jsonl"], verbs.make_verbs(), "meshfree")
+    assert run(shlex.split(snippet.text)[1:], verbs.make_verbs(), "meshfree") == 0
 
 
 @pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
