@@ -7,6 +7,7 @@ from operator import attrgetter
 from typing import NamedTuple
 
 PREFIX = "lb_"  # of the names of attributes of this extension
+COMPARED = "lb_compared"  # where there is a deviation from another cloud
 ORIENTATION = "lb_orientation"  # vectors that orient the normals, where a user chose a side
 AREA, NORMAL = "lb_area", "lb_normal"
 MEAN_CURVATURE, GAUSSIAN_CURVATURE = "lb_mean_curvature", "lb_gaussian_curvature"

@@ -1,81 +1,31 @@
 """The verbs that need no Blender."""
 
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 
-from . import alignment, analysis, clouds, core
+from . import analysis, clouds, core
 from .analysis import WRITE_LIMIT
 from .bending import Deform, SplatInfo
 from .cleaning import STRAYS, THIN_OUT, check_some_stay, stray_line, thin_line, thinner
+from .cloud_verb import CloudVerb, SurfaceVerb, floaters
 from .measures import check_labels, check_numbers, part_table
-from .quantities import ORIENTATION, SEGMENT, STRAY, eigenvector_name, written_by
+from .mesh_verb import Mesh
+from .quantities import SEGMENT, STRAY, eigenvector_name, written_by
+from .reference_verbs import Align, Compare
 from .rows import TABLES, write_rows
-from .settings import LAPLACIAN, Setting, add_setting, chosen, laplacian_options
-from .stages import ToldStages
+from .settings import LAPLACIAN, Setting, chosen
 from .summary import Report
-from .verb import ONE_LINE, Verb
 
 
 def make_verbs() -> list:
     """Return new verbs of all kinds."""
-    return [Analyze(), Measure(), StrayPoints(), ThinOut(), Align(), *without_object()]
+    return [Analyze(), Measure(), StrayPoints(), ThinOut(), Mesh(), Align(), Compare(), *without_object()]
 
 
 def without_object() -> list:
     """Return new verbs that in Blender, too, need no object."""
     return [Info(), Convert(), SplatInfo(), Deform(), Report()]
-
-
-class CloudVerb(Verb):
-    """A verb for clouds, with options for how they are read; `work` of a subclass processes one."""
-
-    settings = ()  # its own
-
-    @property
-    def inputs(self):
-        """What is read."""
-        return f"point clouds: {', '.join(clouds.inputs())}. Text has columns x y z and may have a header"
-
-    @property
-    def outputs(self):
-        """Endings of files."""
-        return clouds.outputs()
-
-    @property
-    def description(self):
-        """What it does, in full."""
-        return f"{self.help[0].upper()}{self.help[1:]}. {ONE_LINE}"
-
-    def add_options(self, parser):
-        for setting in self.settings:
-            add_setting(parser, setting)
-        parser.add_argument(
-            "--columns",
-            default="",
-            metavar="NAMES",
-            help='names of the columns of text files, such as "x y z - r g b"; else those found',
-        )
-        parser.add_argument(
-            "--classes", default="", metavar="NUMBERS", help='classes of LAS files to read, such as "2 5"; else all'
-        )
-        parser.add_argument("--withheld", action="store_true", help="read points of LAS files, too, that are withheld")
-
-    def read(self, path, arguments, columns=""):
-        """Return what a file holds, points or splats."""
-        las = core.files.LasChoices(core.files.parse_classes(arguments.classes), arguments.withheld)
-        return clouds.read_file(path, columns, las)
-
-    def run(self, path, arguments, output):
-        given = self.read(path, arguments, arguments.columns)
-        with ToldStages(self.name) as stages:
-            figures, notices = self.work(path, given, arguments, output, stages)
-        return {**figures, "seconds": stages.rounded, "notices": [*given.notices, *notices]}
-
-    def work(self, path, given, arguments, output, progress):
-        """Process points or splats, write the output, and return what to print, and notices."""
-        raise NotImplementedError
 
 
 class Info(CloudVerb):
@@ -109,24 +59,6 @@ class Convert(CloudVerb):
         splats = isinstance(given, core.Splats)
         rest = {} if splats or output.suffix.lower() != ".npz" else given.attributes
         return {"points": len(given) if splats else len(given.points)}, clouds.write(output, given, rest)
-
-
-class SurfaceVerb(CloudVerb):
-    """A verb that builds the Laplacian of a cloud."""
-
-    def add_options(self, parser):
-        super().add_options(parser)
-        for setting in LAPLACIAN.values():
-            add_setting(parser, setting)
-
-    def build(self, cloud, values, progress):
-        """Return the operator of a cloud, by the values of the settings in `LAPLACIAN`."""
-        boundary, name = None, values["boundary_group"]
-        if name:
-            boundary = cloud.numbers(name, "--boundary-group") > 0
-        built = analysis.build(cloud.points, laplacian_options(values), boundary, cloud.out, progress)
-        sides = cloud.columns.get(ORIENTATION)
-        return built if sides is None else analysis.oriented(built, sides)
 
 
 class Frames:
@@ -191,11 +123,6 @@ class Analyze(Frames, SurfaceVerb):
             everything = analysis.arrays(cloud.place, built, spectrum) if output.suffix.lower() == ".npz" else None
             written = clouds.write(output, given, {**measures, **modes}, everything)
         return {**analysis.figures(measures, spectrum), **matched}, [*laplacian.notices, *notices, *written]
-
-
-def floaters(arguments) -> bool:
-    """Whether floaters among splats are left out."""
-    return chosen([LAPLACIAN["leave_out_floaters"]], arguments)["leave_out_floaters"]
 
 
 class Measure(SurfaceVerb):
@@ -267,41 +194,3 @@ class ThinOut(CloudVerb):
         written = [] if output is None else clouds.write(output, cloud.taken(kept), {})
         apart = "" if spacing is None else f", at least {spacing:.4g} from each other"
         return {"points": int(np.count_nonzero(kept)), "done": f"{path.stem}: {thin_line(kept)}{apart}"}, written
-
-
-class Align(CloudVerb):
-    """The verb `align`, whose outputs are in the coordinates of the reference."""
-
-    name = "align"
-    help = "move points onto the surface of those of another file, from nearby"
-    settings = tuple(alignment.ALIGN.values())
-    reads = ("reference",)
-    operator = "align_points"  # which writes the same result in Blender
-    _target = None  # points of the reference, in its coordinates
-
-    def add_options(self, parser):
-        parser.add_argument(
-            "--reference",
-            required=True,
-            metavar="FILE",
-            help="point cloud that the points are moved onto, of the kinds of inputs",
-        )
-        super().add_options(parser)
-
-    def work(self, path, given, arguments, output, progress):
-        reference = Path(arguments.reference)
-        if self._target is None:
-            self._target = clouds.Cloud(reference, self.read(reference, arguments))
-        cloud, target = clouds.Cloud(path, given), self._target
-        shift = cloud.place - target.place
-        found = core.align(cloud.points + shift, target.points, **chosen(self.settings, arguments), progress=progress)
-        alignment.check_found(found, path.stem, reference.stem)
-        written = []
-        if output is not None:
-            [residual] = written_by(self.operator)
-            moved = clouds.moved(given, cloud.points + shift, found.matrix, target.place)
-            written = clouds.write(output, moved, {residual: found.residual})
-        half = f"half of them within {alignment.middle(found):.4g}"
-        line = f"{path.stem}: {found.overlap:.0%} of the points lie on {reference.name}, {half}"
-        figures = {"points": len(cloud.points), "done": line, **alignment.figures(found, target.place)}
-        return figures, [*target.notices, *alignment.doubts(found), *written]

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 
 from ... import core
-from ...command import alignment
+from ...command import alignment, comparison
 from ...command.settings import as_place, place
 from ...core.files import MESHES, READABLE, read_points, write_mesh
 from ..objects.attributes import point_count
@@ -17,7 +17,7 @@ from ..objects.reading import read_points as seen_points
 from ..running.application import build_operator, naming
 from ..tools.align import Align
 from ..tools.along import SignedDistance
-from ..tools.compare import Compare, distances
+from ..tools.compare import Compare
 from ..tools.mesh import MeshSurface
 from ..tools.orient import OrientNormals
 from ..tools.simulate import Simulate
@@ -191,13 +191,7 @@ class CompareWith(WithReference):
 
     def figures(self, tool, result):
         found, *_ = result
-        mean, within, most = distances(found)
-        return {
-            "compared_count": int(np.count_nonzero(found.known)),
-            "mean_distance": mean,
-            "distance_95": within,
-            "greatest_distance": most,
-        }
+        return comparison.figures(found)
 
 
 class AlignWith(WithReference):

@@ -6,7 +6,7 @@ import bmesh
 import bpy
 import numpy as np
 
-from ...command.quantities import AREA, EIGENVECTOR, ORIENTATION, quantity
+from ...command.quantities import AREA, COMPARED, EIGENVECTOR, ORIENTATION, quantity
 from ...core import PointCloudError
 
 
@@ -38,7 +38,6 @@ SLOPE, SLOPE_2, SLOPE_OF = ".lb_slope", ".lb_slope_2", ".lb_slope_of"
 SOLID, TILT = ".lb_color", ".lb_tilt"
 RISE = "lb_rise"  # difference of the displayed value to that at the center of a disc
 CORNER = "lb_corner"  # marks corners of the discs of the display, which are not points
-COMPARED = "lb_compared"  # where there is a deviation from another cloud
 REST = "lb_rest"  # positions before the displacement
 SPLAT_SCALE, SPLAT_ROTATION = "lb_splat_scale", "lb_splat_rotation"  # of deformed splats
 MOVED_DISC = "lb_moved_disc"  # the disc after a deformation

@@ -4,11 +4,10 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, FloatProperty
 
-from ... import core
-from ...command.alignment import check_found, doubts
-from ...command.quantities import DEVIATION
-from ...core import PointCloudError
-from ..objects.attributes import COMPARED, tag_changed, write_attribute
+from ...command.alignment import doubts
+from ...command.comparison import COMPARE, compared, left_out, line
+from ...command.quantities import COMPARED, DEVIATION
+from ..objects.attributes import tag_changed, write_attribute
 from ..objects.place import activate, hide
 from ..objects.reading import obstacle
 from ..objects.result import length_text
@@ -27,15 +26,12 @@ class Compare(Tool):
 
     align_first: BoolProperty(
         name="Align First",
-        description="Move the object onto the other cloud before it is compared, as Align Points does",
-        default=False,
+        **COMPARE["align_first"].keywords,
     )
     greatest: FloatProperty(
         name="Greatest Distance",
-        description="Points farther from the other surface are not compared; 0 for any distance",
-        default=0.0,
-        min=0.0,
         subtype="DISTANCE",
+        **COMPARE["greatest"].keywords,
     )
     hide_reference: BoolProperty(
         name="Hide Reference",
@@ -46,31 +42,17 @@ class Compare(Tool):
     def plan(self, context, obj):
         reading, operator = operator_reader(context, obj)
         name, other_operator, shift, other = self.other(context, obj)
-        greatest, own_name = self.greatest or None, obj.name
+        greatest, own_name = self.greatest, obj.name
         motion = Motion(obj, shift, other) if self.align_first else None
 
         def compute(progress):
             normals = operator(lambda stage, fraction: progress(stage, 0.4 * fraction)).normals
             with naming(name):
                 laplacian = other_operator(lambda stage, fraction: progress(stage, 0.4 + 0.4 * fraction))
-            points, aligned = reading.points + shift, None
-            if motion is not None:
-                aligned = core.align(points, laplacian.points, progress=lambda stage, _: progress(stage, 0.8))
-                check_found(aligned, own_name, name, ADVICE)
-                linear = aligned.matrix[:3, :3]
-                points, normals = points @ linear.T + aligned.matrix[:3, 3], normals @ linear.T
-            found = core.surface_deviation(
-                points,
-                normals,
-                laplacian,
-                greatest,
-                progress=lambda stage, fraction: progress(stage, 0.8 + 0.2 * fraction),
+            names = own_name, name
+            found, aligned = compared(
+                reading.points + shift, normals, laplacian, motion is not None, greatest, names, ADVICE, progress
             )
-            if not found.known.any():
-                raise PointCloudError(
-                    f'No point of "{own_name}" has the surface of "{name}" above or below it. Move the objects onto'
-                    " each other, or raise Greatest Distance."
-                )
             return found, name, motion, aligned
 
         return compute
@@ -103,22 +85,7 @@ class Compare(Tool):
         write_attribute(obj.data, DEVIATION, found.distance)
         write_attribute(obj.data, COMPARED, found.known)
         tag_changed(obj.data)
-        mean, within, most = map(length_text, distances(found))
-        line = f"{obj.name}: {mean} from {name} on average, 95 % within {within}, {most} at most"
-        left = np.count_nonzero(~found.known)
-        if not left:
-            return [*told, line]
-        notice = (
-            f"{left:,} of {len(found.known):,} points lie beside the surface of {name}, or too far from it: they are"
-            f" not compared, and {COMPARED} is false there."
-        )
-        return [*told, notice, line]
-
-
-def distances(found):
-    """Return the mean, the 95th percentile and the maximum of the distances of a `Deviation`."""
-    sizes = np.abs(found.distance[found.known])
-    return float(sizes.mean()), float(np.percentile(sizes, 95.0)), float(sizes.max())
+        return [*told, *left_out(found, name), line(found, obj.name, name, length_text)]
 
 
 class CompareOperator(Compare, ShownOperator):

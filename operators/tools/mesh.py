@@ -6,6 +6,7 @@ import numpy as np
 from bpy.props import BoolProperty, FloatProperty
 
 from ... import core
+from ...command.meshing import GAP, MESH
 from ...command.quantities import quantity
 from ..objects.attributes import DISC, STORABLE, point_count, read_attribute, write_attribute
 from ..objects.color_choices import COLOR_CHOICES
@@ -20,7 +21,6 @@ from ..running.application import ApplicationOperator, Tool, operator_reader
 from ..running.measures import carry
 
 _LEFT = DISC, "position"  # attributes that are not valid on a mesh
-_GAP = 12  # edges around a hole that counts as a gap between points
 _STEPS = 255  # of weights
 
 
@@ -33,13 +33,9 @@ class MeshSurface(Tool):
 
     detail: FloatProperty(
         name="Detail",
-        description="How many edges there are along the distance between neighboring points; 2 makes four times as many"
-        " faces as 1",
-        default=1.0,
-        min=0.05,
         soft_min=0.25,
         soft_max=4.0,
-        max=16.0,
+        **MESH["detail"].keywords,
     )
     keep_open: BoolProperty(
         name="Keep Open",
@@ -65,7 +61,7 @@ class MeshSurface(Tool):
             collection.objects.link(made)
         made.matrix_world = obj.matrix_world
         copy_place(made, obj)
-        opened = _close(made.data, _GAP if self.keep_open else 0)
+        opened = _close(made.data, GAP if self.keep_open else 0)
         carried.write(made)
         for name in COLOR_CHOICES:
             setattr(made.meshfree, name, getattr(obj.meshfree, name))

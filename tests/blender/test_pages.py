@@ -66,11 +66,9 @@ def folder(core, tmp_path, monkeypatch):
     )
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "rigged.blend"), copy=True)
     new_file()
-    (tmp_path / "list.txt").write_text("scan.ply\nplan.ply\n")
-    (tmp_path / "thin").mkdir()
-    (tmp_path / "thin" / "1.jsonl").write_text(
-        '{"path": "/scan.ply", "verb": "info", "elapsed": 0.1}\n'
-    )
+    (tmp_path / "list.txt").write_text("scan.ply\nplan.ply\ndays/days_1.ply\ndays/days_2.ply\n")
+    (tmp_path / "reports").mkdir()
+    (tmp_path / "reports" / "2.jsonl").write_text('{"path": "/scan.ply", "verb": "info", "elapsed": 0.1}\n')
     bar = bar_splats(core)
     small = replace(bar, positions=np.float32(0.4 * bar.positions), scales=np.float32(0.4 * bar.scales))
     for name in ("guitar", "a", "b"):

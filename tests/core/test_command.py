@@ -13,6 +13,7 @@ import core
 from benchmarks.samplings import fibonacci_sphere, square_grid
 from command import verbs
 from command.main import run as run_command
+from command.meshing import close_gaps
 from core.files import PointTable, read_points, write_points
 
 FAR = np.array([400_000.0, 5_000_000.0, 100.0])
@@ -163,6 +164,65 @@ class TestAlign:
         matrix = np.array(line["matrix"])
         assert_allclose(read_points(source).points @ matrix[:3, :3].T + matrix[:3, 3], table.points, atol=1e-6)
         assert run("align", source, "--reference", plan, "--out", plan)[0] == 1
+
+
+class TestCompare:
+    def test_distances_have_the_sign_of_the_side(self, run, tmp_path):
+        plan = write(tmp_path / "plan.ply", SPHERE + FAR)
+        sources = [write(tmp_path / f"{size}.ply", size * fibonacci_sphere(700) + FAR) for size in (0.95, 1.05)]
+        code, lines = run("compare", *sources, "--reference", plan, "--out-dir", tmp_path / "out")
+        assert code == 0, lines
+        for line, exact in zip(lines, (-0.05, 0.05), strict=True):
+            assert line["compared_count"] == 700
+            assert line["mean_distance"] == pytest.approx(0.05, abs=1e-3)
+            found = read_points(Path(line["output"])).attributes
+            assert_allclose(found["lb_deviation"], exact, atol=2e-3)
+            assert found["lb_compared"].all()
+
+    def test_what_is_far_is_told_and_what_is_moved_is_written_there(self, run, tmp_path):
+        plan = write(tmp_path / "plan.ply", SPHERE * [1.0, 0.8, 0.6])
+        source = write(tmp_path / "a.ply", (SPHERE * [1.0, 0.8, 0.6])[::2] + [0.1, 0.0, 0.05])
+        code, [line] = run("compare", source, "--reference", plan, "--align-first", "--out", tmp_path / "b.ply")
+        assert (code, line["greatest_distance"] < 0.01) == (0, True)
+        moved = read_points(tmp_path / "b.ply").points
+        assert_allclose(((moved / [1.0, 0.8, 0.6]) ** 2).sum(axis=1), 1.0, atol=0.02)
+        code, [line] = run("compare", source, "--reference", plan, "--greatest", 0.05)
+        assert (code, line["compared_count"] < 400) == (0, True)
+        assert any("they are not compared" in notice for notice in line["notices"])
+
+
+class TestMesh:
+    def test_a_closed_surface_with_columns_and_colors(self, run, tmp_path):
+        height = 0.5 + 0.5 * SPHERE[:, 2]
+        colors = np.column_stack([height, height, height, np.ones(800)]).astype(np.float32)
+        table = PointTable(SPHERE + FAR, {"height": height, "side": (SPHERE[:, 0] > 0.0).astype(np.int32)}, colors)
+        write_points(tmp_path / "a.ply", table)
+        code, [line] = run("mesh", tmp_path / "a.ply", "--out", tmp_path / "b.ply")
+        assert (code, line["open_edges"]) == (0, 0)
+        mesh = read_points(tmp_path / "b.ply")
+        points = mesh.points - FAR
+        assert len(points) == line["vertices"]
+        assert_allclose(np.linalg.norm(points, axis=1), 1.0, atol=5e-3)
+        assert_allclose(mesh.attributes["height"], 0.5 + 0.5 * points[:, 2], atol=0.01)
+        assert_allclose(mesh.colors[:, 0], 0.5 + 0.5 * points[:, 2], atol=0.02)
+        assert set(mesh.attributes["side"]) == {0, 1}
+
+    @pytest.mark.parametrize(("removed", "closed"), [([44], 2), ([44, 45, 46], 6), ([11, 88], 4), ([44, 55], 0)])
+    def test_small_holes_of_a_mesh_are_closed(self, removed, closed):
+        """Of a torus of quads, whose Euler characteristic stays zero; where two holes touch at a vertex, both stay."""
+        row, column = np.divmod(np.arange(100), 10)
+        corner = lambda down, right: 10 * ((row + down) % 10) + (column + right) % 10  # noqa: E731
+        whole = np.stack([corner(0, 0), corner(0, 1), corner(1, 1), corner(1, 0)], axis=1)
+        faces = np.delete(whole, removed, axis=0)
+        triangles, left = close_gaps(faces)
+        assert (len(triangles), left) == (closed, 0 if closed else 8)
+        sides = [np.stack([part, np.roll(part, -1, axis=1)], axis=2).reshape(-1, 2) for part in (faces, triangles)]
+        edges = [tuple(edge) for edge in np.concatenate(sides).tolist()]
+        assert len(set(edges)) == len(edges)  # so all faces are oriented alike
+        if closed:
+            assert {(end, begin) for begin, end in edges} == set(edges)
+            assert 100 - len(edges) // 2 + len(faces) + len(triangles) == 0
+        assert len(close_gaps(faces, most=3)[0]) == 0
 
 
 class TestFiles:

@@ -51,6 +51,14 @@ class TestInputs:
         (folder / "empty").mkdir()
         assert run("info", folder / "empty") == (2, [])
 
+    def test_frames_of_a_folder_come_before_other_files(self, folder, capsys):
+        for name in ("f_10", "f_9", "notes"):
+            np.save(folder / f"{name}.npy", POINTS)
+        assert run_command(["info", str(folder)], verbs.make_verbs(), "meshfree") == 0
+        printed = capsys.readouterr()
+        assert names(map(json.loads, printed.out.splitlines())) == ["f_9.npy", "f_10.npy"]
+        assert "left out notes.npy, which are no frames" in printed.err
+
     def test_a_list_in_a_file_or_from_standard_input(self, run, folder, monkeypatch):
         wanted = [folder / "in" / name for name in ("LHD_650_11.npy", "LHD_651_10.npy")]
         text = f"{wanted[0]}\n\n  {wanted[1]}  \n"

@@ -1,0 +1,80 @@
+"""Verbs for clouds of files: what is read, and the Laplacian of it."""
+
+from . import analysis, clouds, core
+from .quantities import ORIENTATION
+from .settings import LAPLACIAN, add_setting, chosen, laplacian_options
+from .stages import ToldStages
+from .verb import ONE_LINE, Verb
+
+
+class CloudVerb(Verb):
+    """A verb for clouds, with options for how they are read; `work` of a subclass processes one."""
+
+    settings = ()  # its own
+
+    @property
+    def inputs(self):
+        """What is read."""
+        return f"point clouds: {', '.join(clouds.inputs())}. Text has columns x y z and may have a header"
+
+    @property
+    def outputs(self):
+        """Endings of files."""
+        return clouds.outputs()
+
+    @property
+    def description(self):
+        """What it does, in full."""
+        return f"{self.help[0].upper()}{self.help[1:]}. {ONE_LINE}"
+
+    def add_options(self, parser):
+        for setting in self.settings:
+            add_setting(parser, setting)
+        parser.add_argument(
+            "--columns",
+            default="",
+            metavar="NAMES",
+            help='names of the columns of text files, such as "x y z - r g b"; else those found',
+        )
+        parser.add_argument(
+            "--classes", default="", metavar="NUMBERS", help='classes of LAS files to read, such as "2 5"; else all'
+        )
+        parser.add_argument("--withheld", action="store_true", help="read points of LAS files, too, that are withheld")
+
+    def read(self, path, arguments, columns=""):
+        """Return what a file holds, points or splats."""
+        las = core.files.LasChoices(core.files.parse_classes(arguments.classes), arguments.withheld)
+        return clouds.read_file(path, columns, las)
+
+    def run(self, path, arguments, output):
+        given = self.read(path, arguments, arguments.columns)
+        with ToldStages(self.name) as stages:
+            figures, notices = self.work(path, given, arguments, output, stages)
+        return {**figures, "seconds": stages.rounded, "notices": [*given.notices, *notices]}
+
+    def work(self, path, given, arguments, output, progress):
+        """Process points or splats, write the output, and return what to print, and notices."""
+        raise NotImplementedError
+
+
+class SurfaceVerb(CloudVerb):
+    """A verb that builds the Laplacian of a cloud."""
+
+    def add_options(self, parser):
+        super().add_options(parser)
+        for setting in LAPLACIAN.values():
+            add_setting(parser, setting)
+
+    def build(self, cloud, values, progress):
+        """Return the operator of a cloud, by the values of the settings in `LAPLACIAN`."""
+        boundary, name = None, values["boundary_group"]
+        if name:
+            boundary = cloud.numbers(name, "--boundary-group") > 0
+        built = analysis.build(cloud.points, laplacian_options(values), boundary, cloud.out, progress)
+        sides = cloud.columns.get(ORIENTATION)
+        return built if sides is None else analysis.oriented(built, sides)
+
+
+def floaters(arguments) -> bool:
+    """Whether floaters among splats are left out."""
+    return chosen([LAPLACIAN["leave_out_floaters"]], arguments)["leave_out_floaters"]

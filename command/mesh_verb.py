@@ -1,0 +1,49 @@
+"""The verb that makes a mesh of a cloud."""
+
+import numpy as np
+
+from . import clouds, core
+from .cloud_verb import SurfaceVerb, floaters
+from .meshing import MESH, close_gaps
+from .settings import LAPLACIAN, chosen
+
+
+class Mesh(SurfaceVerb):
+    """The verb `mesh`, whose outputs are files of meshes."""
+
+    name = "mesh"
+    help = "reconstruct a mesh from the points, with their columns and colors on its vertices"
+    outputs = core.files.MESHES
+    settings = tuple(MESH.values())
+
+    def work(self, path, given, arguments, output, progress):
+        cloud = clouds.Cloud(path, given, floaters(arguments))
+        laplacian = self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress).laplacian
+        mesh = core.mesh_surface(laplacian, **chosen(self.settings, arguments), progress=progress)
+        closed, opened = close_gaps(mesh.faces)
+        faces, written = [mesh.faces, closed], []
+        if output is not None:
+            table = _on_vertices(cloud, laplacian, mesh.vertices)
+            written = core.files.write_mesh(output, table, faces, double=not table.single)
+        figures = {"vertices": len(mesh.vertices), "faces": sum(map(len, faces)), "open_edges": opened}
+        return {"points": len(cloud.points), **figures}, [*laplacian.notices, *written]
+
+
+def _seen_colors(splats):
+    """Return the view-independent colors of splats, opaque, (n, 4)."""
+    return np.column_stack([core.splats.CONSTANT * splats.colors + 0.5, np.ones(len(splats))])
+
+
+def _on_vertices(cloud, laplacian, vertices):
+    """Return vertices in the coordinates of the file, with the columns and colors of the points."""
+    colors = cloud.given.colors if cloud.splats is None else _seen_colors(cloud.splats)
+    single = cloud.splats is not None or cloud.given.single
+    table = core.files.PointTable(vertices + cloud.place, single=single)
+    if cloud.columns or colors is not None:
+        carrying, count = core.values_on_mesh(laplacian, vertices), len(vertices)
+        for name, values in cloud.columns.items():
+            carry = carrying.interpolate if values.dtype.kind == "f" else carrying.labels
+            table.attributes[name] = carry(values)[-count:]
+        if colors is not None:
+            table.colors = np.clip(carrying.interpolate(colors)[-count:], 0.0, 1.0)
+    return table
