@@ -29,7 +29,7 @@ build: ## Build one zip per platform into dist/
 	@$(run)package.py
 
 wheel: ## Build the wheel for scripts without Blender into dist/
-	@$(run)environments.py wheel -m hatchling build -t wheel -d dist
+	@$(run)environments.py hatch -m hatchling build -t wheel -d dist
 
 validate: ## Build, and run Blender's validator on every zip
 	@$(run)package.py --validate
