@@ -13,6 +13,7 @@ from .measures import check_labels, check_numbers, part_table
 from .mesh_verb import Mesh
 from .quantities import SEGMENT, STRAY, eigenvector_name, written_by
 from .reference_verbs import Align, Compare
+from .result_verbs import PrincipalCurvatures, Roughness, SurfaceVariation
 from .rows import TABLES, write_rows
 from .settings import LAPLACIAN, Setting, chosen
 from .summary import Report
@@ -20,7 +21,8 @@ from .summary import Report
 
 def make_verbs() -> list:
     """Return new verbs of all kinds."""
-    return [Analyze(), Measure(), StrayPoints(), ThinOut(), Mesh(), Align(), Compare(), *without_object()]
+    on_surfaces = Analyze(), PrincipalCurvatures(), Roughness(), SurfaceVariation(), Measure(), Mesh()
+    return [*on_surfaces, StrayPoints(), ThinOut(), Align(), Compare(), *without_object()]
 
 
 def without_object() -> list:

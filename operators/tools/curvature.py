@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import bpy
-import numpy as np
 from bpy.props import EnumProperty, FloatProperty
 
 from ... import core
@@ -18,12 +17,13 @@ from ...command.quantities import (
     rows_of,
     written_by,
 )
+from ...command.results import ROUGHNESS as ROUGHNESS_SETTINGS
+from ...command.results import check_wavelength, curvature_line, roughness_line
 from ..objects.attributes import tag_changed, write_attribute
 from ..objects.result import length_text
 from ..registration import Registration, Row
 from ..running import cache
 from ..running.application import ShownOperator, Tool, operator_reader
-from .smooth import check_wavelength
 
 _SHOWN = {
     "SHAPE_INDEX": ("Shape Index", SHAPE_INDEX),
@@ -66,7 +66,7 @@ class Curvatures(Tool):
         for row in rows_of("principal_curvatures"):
             write_attribute(obj.data, row.attribute, row.of(result))
         tag_changed(obj.data)
-        return [f"{obj.name}: curvatures from {result.second.min():.4g} to {result.first.max():.4g}"]
+        return [f"{obj.name}: {curvature_line(result)}"]
 
 
 class MESHFREE_OT_principal_curvatures(Curvatures, ShownOperator, bpy.types.Operator):
@@ -85,10 +85,8 @@ class Roughness(Tool):
 
     wavelength: FloatProperty(
         name="Wavelength",
-        description="Wavelength of which half counts as roughness; 0 for a default suited to the points",
-        default=0.0,
-        min=0.0,
         subtype="DISTANCE",
+        **ROUGHNESS_SETTINGS["wavelength"].keywords,
     )
 
     def plan(self, context, obj):
@@ -111,7 +109,7 @@ class Roughness(Tool):
     def write(self, context, obj, result):
         write_attribute(obj.data, ROUGHNESS, result)
         tag_changed(obj.data)
-        return [f"{obj.name}: roughness {length_text(np.sqrt(np.mean(result**2)))} on average"]
+        return [f"{obj.name}: {roughness_line(result, length_text)}"]
 
 
 class MESHFREE_OT_roughness(Roughness, ShownOperator, bpy.types.Operator):

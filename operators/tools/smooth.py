@@ -5,6 +5,7 @@ import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ... import core
+from ...command.results import check_wavelength
 from ...core import PointCloudError
 from ..objects.animation import curves
 from ..objects.carried import carries
@@ -176,15 +177,6 @@ def _smooth(laplacian, method, dirichlet, modes, wavelength, gain, progress):
         return core.smooth_points(laplacian, core.exponential(np.log(2.0) * squared), **settings)
     low = (2.0 * np.pi / (wavelength or _DETAIL * length)) ** 2
     return core.smooth_points(laplacian, core.boost(gain, low, _FINEST**2 * low), **settings)
-
-
-def check_wavelength(wavelength, points, name):
-    """Refuse a wavelength beyond the size of the object of some name with these points, (n, 3)."""
-    size = np.linalg.norm(np.ptp(points, axis=0))
-    if wavelength > size:
-        raise PointCloudError(
-            f'The wavelength {wavelength:.4g} is longer than "{name}" is large ({size:.4g}). Use a shorter one.'
-        )
 
 
 class ModeShape(Tool):

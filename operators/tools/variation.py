@@ -1,10 +1,10 @@
 """How far the neighborhoods of points are from planes."""
 
 import bpy
-import numpy as np
 
 from ... import core
 from ...command.quantities import SURFACE_VARIATION
+from ...command.results import variation_line
 from ..objects.attributes import tag_changed, write_attribute
 from ..registration import Registration, Row
 from ..running import cache
@@ -28,7 +28,7 @@ class SurfaceVariation(Tool):
     def write(self, context, obj, result):
         write_attribute(obj.data, SURFACE_VARIATION, result)
         tag_changed(obj.data)
-        return [f"{obj.name}: surface variation {np.median(result):.3g} (median), up to {result.max():.3g}"]
+        return [f"{obj.name}: {variation_line(result)}"]
 
 
 class MESHFREE_OT_surface_variation(SurfaceVariation, ShownOperator, bpy.types.Operator):

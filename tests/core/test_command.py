@@ -14,6 +14,7 @@ from benchmarks.samplings import fibonacci_sphere, square_grid
 from command import verbs
 from command.main import run as run_command
 from command.meshing import close_gaps
+from command.quantities import rows_of
 from core.files import PointTable, read_points, write_points
 
 FAR = np.array([400_000.0, 5_000_000.0, 100.0])
@@ -164,6 +165,34 @@ class TestAlign:
         matrix = np.array(line["matrix"])
         assert_allclose(read_points(source).points @ matrix[:3, :3].T + matrix[:3, 3], table.points, atol=1e-6)
         assert run("align", source, "--reference", plan, "--out", plan)[0] == 1
+
+
+class TestResults:
+    @pytest.mark.parametrize(
+        ("verb", "expected"),
+        [
+            ("principal-curvatures", core.principal_curvatures),
+            ("surface-variation", core.surface_variation),
+            ("roughness", core.roughness),
+        ],
+    )
+    def test_they_are_what_core_gives_to_the_bit(self, run, tmp_path, verb, expected):
+        points = SPHERE * [1.0, 0.8, 0.6]
+        source = write(tmp_path / "a.ply", points, row=np.arange(800))
+        code, [line] = run(verb, source, "--out", tmp_path / "a.npz")
+        assert (code, line["points"], line["done"].startswith("a: ")) == (0, 800, True)
+        found, exact = np.load(tmp_path / "a.npz"), expected(core.build_laplacian(points))
+        rows = rows_of(verb.replace("-", "_"))
+        assert set(found.files) == {"points", *(row.attribute.removeprefix("lb_") for row in rows)}
+        for row in rows:
+            values = row.of(exact) if row.source else exact
+            assert_array_equal(found[row.attribute.removeprefix("lb_")], values)
+        assert run(verb, source, "--out", tmp_path / "b.ply")[0] == 0
+        assert {"row", *(row.attribute for row in rows)} == set(read_points(tmp_path / "b.ply").attributes)
+
+    def test_wavelengths_beyond_the_cloud_are_refused(self, run, tmp_path):
+        code, [line] = run("roughness", write(tmp_path / "a.ply", SPHERE), "--wavelength", 99)
+        assert (code, 'longer than "a" is large' in line["error"]) == (1, True)
 
 
 class TestCompare:
