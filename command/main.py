@@ -35,7 +35,8 @@ def run(argv, verbs, program) -> int:
     -------
     int
         Exit code: 0 if all files succeeded, or their errors are in the report that was asked for; 1 if any failed
-        without a report; 2 for wrong usage; 3 if memory or disk were not enough, so that another machine may do it.
+        without a report, or that cannot be written; 2 for wrong usage; 3 if memory or disk were not enough, so that
+        another machine may do it.
     """
     try:
         verb, arguments = _parse(argv, verbs, program)
@@ -54,8 +55,12 @@ def run(argv, verbs, program) -> int:
             told = DONE if arguments.report is not None else FAILED
             code = max(code, ELSEWHERE if _is_scarcity(error) else told)
         line = {"file": str(path), **result}
-        records.keep(path, line, perf_counter() - began, read)
         print(json.dumps(line), flush=True)
+        try:
+            records.keep(path, line, perf_counter() - began, read)
+        except OSError as error:
+            print(f"{arguments.report} cannot be written: {error.strerror or error}", file=sys.stderr, flush=True)
+            code = max(code, ELSEWHERE if _is_scarcity(error) else FAILED)
     return code
 
 

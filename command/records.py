@@ -2,6 +2,9 @@
 
 import json
 import os
+import stat
+import time
+from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +12,7 @@ import numpy as np
 from .inputs import outputs_of, read_files
 
 SUFFIX = ".jsonl"
+_NEEDED = {"path", "verb", "settings", "stamps", "elapsed", "ended"}  # in a record
 _NOT_SETTINGS = ("command", "files_from", "inputs", "out", "out_dir", "part", "report", "skip_done")
 
 
@@ -50,20 +54,15 @@ class Records:
         self._verb, self._arguments = verb, arguments
         given = {name: value for name, value in vars(arguments).items() if name not in _NOT_SETTINGS}
         self._settings = json.loads(json.dumps(given, default=_plain))
-        self._done = {}
+        self._done = defaultdict(list)
         if arguments.skip_done and arguments.report.parent.is_dir():
-            found, _ = read_reports(arguments.report.parent)
-            self._done = {record["path"]: record for record in found if record["verb"] == verb.name}
+            for record in read_reports(arguments.report.parent)[0]:
+                if "error" not in record and (record["verb"], record.get("settings")) == (verb.name, self._settings):
+                    self._done[record["path"]].append(record["stamps"])
 
     def holds(self, path) -> bool:
         """Whether an input is done, with the same settings, and nothing has changed since."""
-        record = self._done.get(_name(path))
-        return (
-            record is not None
-            and "error" not in record
-            and record["settings"] == self._settings
-            and record["stamps"] == {**self.read_stamps(path), **self._written_stamps(path)}
-        )
+        return {**self.read_stamps(path), **self._written_stamps(path)} in self._done[_name(path)]
 
     def keep(self, path, line, seconds, read):
         """Append the record of an input to the report, if there is one.
@@ -85,6 +84,7 @@ class Records:
             "settings": self._settings,
             "stamps": {**read, **self._written_stamps(path)},
             "elapsed": round(seconds, 3),
+            "ended": round(time.time(), 3),
             **line,
         }
         self._arguments.report.parent.mkdir(parents=True, exist_ok=True)
@@ -94,7 +94,7 @@ class Records:
             file.write(json.dumps(record).encode() + b"\n")  # at once: a killed writer leaves whole lines before it
 
     def read_stamps(self, path) -> dict:
-        """Return size and time of all files that are read for an input, by their paths; None if missing."""
+        """Return size and time of all files that are read for an input, by their paths; None for what is no file."""
         return {_name(file): _stamp(file) for file in read_files(self._verb, path, self._arguments)}
 
     def _written_stamps(self, path):
@@ -109,6 +109,8 @@ def _stamp(path):
     try:
         known = os.stat(path)
     except OSError:
+        return None
+    if not stat.S_ISREG(known.st_mode):
         return None
     return [known.st_size, known.st_mtime_ns]
 
@@ -133,17 +135,25 @@ def read_reports(folder):
     Returns
     -------
     list of dict
-        The last record of each verb on each file, in the order of their paths.
+        All records in the order in which they ended.
     int
         How many lines are no records: of writers that were killed.
     """
-    last, broken = {}, 0
-    # By their times, so that what was done again later counts.
-    for report in sorted(folder.glob(f"*{SUFFIX}"), key=lambda path: (path.stat().st_mtime_ns, path.name)):
+    found, broken = [], 0
+    for report in sorted(folder.glob(f"*{SUFFIX}")):
         for line in report.read_text(encoding="utf-8", errors="replace").splitlines():
             try:
                 record = json.loads(line)
-                last[record["path"], record["verb"]] = record
-            except (ValueError, KeyError, TypeError):
+            except ValueError:
+                record = None
+            if isinstance(record, dict) and record.keys() >= _NEEDED:
+                found.append(record)
+            else:
                 broken += 1
-    return [last[key] for key in sorted(last)], broken
+    return sorted(found, key=lambda record: record["ended"]), broken
+
+
+def last_records(records) -> list:
+    """Return the last record of each verb on each file, of records in the order in which they ended, by their paths."""
+    last = {(record["path"], record["verb"]): record for record in records}
+    return [last[key] for key in sorted(last)]

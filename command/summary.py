@@ -1,7 +1,7 @@
 """The verb that merges reports to one table."""
 
 from . import core
-from .records import SUFFIX, read_reports
+from .records import SUFFIX, last_records, read_reports
 from .rows import TABLES, write_rows
 from .verb import Verb
 
@@ -26,7 +26,8 @@ class Report(Verb):
     def run(self, path, arguments, output):
         if not path.is_dir():
             raise core.PointCloudError(f"There is no folder {path}. Name the one with the reports.")
-        records, broken = read_reports(path)
+        found, broken = read_reports(path)
+        records = last_records(found)
         if not records:
             raise core.PointCloudError(f"{path} has no reports. They are written by --report, and end in {SUFFIX}.")
         rows = [_row(record) for record in records]

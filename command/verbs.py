@@ -58,9 +58,12 @@ class Convert(CloudVerb):
     def work(self, path, given, arguments, output, progress):
         if output is None:
             raise core.PointCloudError("Nothing would be written. Give --out or --out-dir.")
-        splats = isinstance(given, core.Splats)
-        rest = {} if splats or output.suffix.lower() != ".npz" else given.attributes
-        return {"points": len(given) if splats else len(given.points)}, clouds.write(output, given, rest)
+        if isinstance(given, core.Splats):
+            lost = ["Of splats, .npz holds the positions only."] if output.suffix.lower() == ".npz" else []
+            return {"points": len(given)}, [*clouds.write(output, given, {}), *lost]
+        columns = given.attributes if given.colors is None else {**given.attributes, "colors": given.colors}
+        written = clouds.write(output, given, columns if output.suffix.lower() == ".npz" else {})
+        return {"points": len(given.points)}, written
 
 
 class Frames:

@@ -43,7 +43,7 @@ def columns(points):
 
 
 @pytest.fixture
-def folder(core, tmp_path, monkeypatch):
+def folder(core, run, tmp_path, monkeypatch):  # noqa: F811
     """The working folder, with all files that the commands name."""
     monkeypatch.chdir(tmp_path)
     scan = open_sphere()
@@ -67,8 +67,7 @@ def folder(core, tmp_path, monkeypatch):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "rigged.blend"), copy=True)
     new_file()
     (tmp_path / "list.txt").write_text("scan.ply\nplan.ply\ndays/days_1.ply\ndays/days_2.ply\n")
-    (tmp_path / "reports").mkdir()
-    (tmp_path / "reports" / "2.jsonl").write_text('{"path": "/scan.ply", "verb": "info", "elapsed": 0.1}\n')
+    assert run("info", "scan.ply", "--report", "reports/2.jsonl")[0] == 0
     bar = bar_splats(core)
     small = replace(bar, positions=np.float32(0.4 * bar.positions), scales=np.float32(0.4 * bar.scales))
     for name in ("guitar", "a", "b"):

@@ -264,6 +264,10 @@ class TestFiles:
             before = name if name != "b.xyz" else before  # which has no names
         assert_array_equal(np.load(tmp_path / "d.npz")["row"], np.arange(800))
         assert_allclose(np.load(tmp_path / "d.npz")["points"], read_points(source).points, rtol=0.0, atol=1e-15)
+        colors = np.linspace(0.0, 1.0, 3200, dtype=np.float32).reshape(800, 4)
+        write_points(tmp_path / "e.ply", PointTable(SPHERE, colors=colors))
+        assert run("convert", tmp_path / "e.ply", "--out", tmp_path / "e.npz")[0] == 0
+        assert_allclose(np.load(tmp_path / "e.npz")["colors"], colors, atol=0.5 / 255.0)
         assert run("convert", source)[1][0]["error"].startswith("Nothing would be written")
 
     def test_a_summary(self, run, tmp_path):
@@ -293,6 +297,7 @@ class TestFiles:
             "thin-out", tmp_path / "b.ply", "--by", "number", "--count", 200, "--out", tmp_path / "c.ply"
         )
         assert (code, len(core.read_splats(tmp_path / "c.ply"))) == (0, line["points"])
+        assert "positions only" in run("convert", tmp_path / "a.ply", "--out", tmp_path / "a.npz")[1][0]["notices"][-1]
         code, [line] = run("analyze", tmp_path / "a.ply", "--out", tmp_path / "c.csv")
         assert (code, "Splats cannot be written" in line["error"]) == (1, True)
 

@@ -152,6 +152,14 @@ class TestReports:
         lines = [self.thin(run, folder, "--part", f"{k}/3", "--skip-done")[1] for k in (1, 2, 3)]
         assert sum(line.get("skipped", False) for part in lines for line in part) == 7
 
+    def test_what_is_done_with_several_settings_is_known_for_each(self, run, folder):
+        for _ in range(2):
+            for count in (50, 40):
+                options = "--count", count, "--out-dir", folder / f"out{count}", "--skip-done"
+                lines = self.thin(run, folder, *options)[1]
+        assert [line.get("skipped", False) for line in lines].count(True) == 7
+        assert run("report", folder / "r")[1][0]["files"] == 8
+
     def test_other_files_that_are_read_count_too(self, run, folder):
         body = POINTS * [1.0, 0.8, 0.5]
         for name in ("a", "plan"):
@@ -170,7 +178,7 @@ class TestReports:
         _, printed = self.thin(run, folder, "--skip-done")
         assert [line.get("skipped", False) for line in printed[:3]] == [True] * 3
         found, broken = records.read_reports(folder / "r")
-        assert (len(found), broken) == (8, 1)
+        assert (len(records.last_records(found)), broken) == (8, 1)
         code, [line] = run("report", folder / "r")
         assert (code, line["files"], "1 lines are no records" in line["notices"][0]) == (0, 8, True)
 
@@ -219,6 +227,15 @@ def test_what_another_machine_may_do_has_an_exit_code_of_its_own(run, folder, mo
     assert (found, len(lines)) == (code, 2)
     assert all(line["error"] for line in lines)
     assert run(*given)[0] == (code or 1)
+
+
+@pytest.mark.parametrize(("number", "code"), [(errno.ENOSPC, 3), (errno.EACCES, 1)])
+def test_a_report_that_cannot_be_written_is_told(run, folder, monkeypatch, number, code):
+    def fail(*_):
+        raise OSError(number, "no")
+
+    monkeypatch.setattr(records.Records, "keep", fail)
+    assert run("info", folder / "in" / "LHD_650_9.npy", "--report", folder / "r.jsonl")[0] == code
 
 
 def test_a_full_disk_is_told_as_one(run, folder, monkeypatch):
