@@ -161,7 +161,10 @@ class TestSlurm:
     SCRIPT = FARM / "slurm" / "meshfree.sh"
 
     def run(self, *arguments, **variables):
-        environment = {name: value for name, value in os.environ.items() if not name.startswith(("SLURM", "MESHFREE"))}
+        own = ("SLURM", "MESHFREE")  # but for where Slurm's settings are
+        environment = {
+            name: os.environ[name] for name in os.environ if name == "SLURM_CONF" or not name.startswith(own)
+        }
         given = ["bash", str(self.SCRIPT), *map(str, arguments)]
         return subprocess.run(given, capture_output=True, text=True, env={**environment, **variables})
 
