@@ -5,10 +5,10 @@ import numpy as np
 from bpy.props import EnumProperty, FloatProperty, StringProperty
 
 from ... import core
+from ...command.quantities import WEIGHT
 from ...core import PointCloudError
 from ..objects.attributes import tag_changed, write_attribute
 from ..objects.groups import LOW, check_assignable, chosen_members, group_weights, has_group, put_group
-from ..objects.quantities import WEIGHT
 from ..objects.result import length_text
 from ..registration import Registration, Row
 from ..running import cache

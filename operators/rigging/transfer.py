@@ -7,10 +7,10 @@ import numpy as np
 from bpy.props import BoolProperty, FloatProperty
 
 from ... import core
+from ...command.quantities import TRANSFER, quantity
 from ...core import PointCloudError
 from ..objects.attributes import tag_changed, write_attribute
 from ..objects.handlers import notify
-from ..objects.quantities import TRANSFER, quantity
 from ..objects.reading import TYPES, obstacle
 from ..objects.result import length_text
 from ..running.application import ShownOperator, Tool, chosen_objects, naming, operator_reader

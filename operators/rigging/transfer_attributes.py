@@ -8,10 +8,10 @@ import numpy as np
 from bpy.props import EnumProperty, StringProperty
 
 from ... import core
+from ...command.quantities import PREFIX, quantity
 from ...core import PointCloudError
-from ..objects.attributes import PREFIX, STORABLE, check_names, point_count, read_attribute, write_attribute
+from ..objects.attributes import STORABLE, check_names, point_count, read_attribute, write_attribute
 from ..objects.colors import COLORS, own_colors
-from ..objects.quantities import quantity
 from ..registration import Registration, Row
 from .transfer import Transfer, TransferOperator
 
