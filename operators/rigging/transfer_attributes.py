@@ -60,7 +60,7 @@ class TransferAttributes(Transfer):
 
     _shown = ""
     shows_colors = True
-    asks = ("reverse", "distance", "angle", "attributes", "pattern", "preview")
+    asks = ("reverse", "distance", "angle", "attributes", "pattern", "preview", "show")
 
     attributes: EnumProperty(
         name="Attributes",

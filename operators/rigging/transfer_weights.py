@@ -85,7 +85,7 @@ def read(obj) -> Weights:
 class TransferWeights(Transfer):
     """The settings and the work of `meshfree.transfer_weights`."""
 
-    asks = ("reverse", "distance", "angle", "groups", "pattern", "mix", "replace", "preview")
+    asks = ("reverse", "distance", "angle", "groups", "pattern", "mix", "replace", "preview", "show")
 
     groups: EnumProperty(
         name="Groups",
