@@ -4,7 +4,8 @@ import bpy
 
 from ..operators import registration
 from ..operators.deform import live
-from ..operators.deform.binding import copied_from, handled_object, is_bound
+from ..operators.deform.binding import is_bound
+from ..operators.deform.handles import copied_from, handled_object
 from ..operators.deform.nodes import find_deform, is_baked
 from ..operators.deform.pose import State
 from ..operators.objects.groups import handle_names

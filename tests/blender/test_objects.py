@@ -127,7 +127,7 @@ class TestCopiesOfBoundObjects:
     def test_the_handle_leads_to_the_original(self, bound):
         copy = duplicate(bound)
         copy.name = "A"  # before the other in the scene's order, or not
-        assert part("operators.deform.binding").handled_object(empty_of(bound), bpy.context.scene) == bound
+        assert part("operators.deform.handles").handled_object(empty_of(bound), bpy.context.scene) == bound
 
     def test_appended_to_another_file_it_follows(self, bound, tmp_path):
         path = str(tmp_path / "bound.blend")
