@@ -6,6 +6,8 @@ import bpy
 
 from .modifiers import inputs_of, is_own, put_inputs
 
+_OF_PARENT = "parent", "parent_type", "parent_bone"  # in the order in which they can be set
+
 
 @contextmanager
 def all_or_nothing(objects):
@@ -55,11 +57,13 @@ def _written(obj):
 
 
 class _State:
-    """The state of an object beside its data: transform, data-block, modifiers, custom properties, settings."""
+    """The state of an object beside its data: place, parent, data-block, modifiers, custom properties, settings."""
 
     def __init__(self, obj):
         self._obj, self._data = obj, obj.data
         self._place, self._world = obj.matrix_basis.copy(), obj.matrix_world.copy()
+        self._parent = {name: getattr(obj, name) for name in _OF_PARENT}
+        self._inverse = obj.matrix_parent_inverse.copy()
         self._modifiers = {item.name: inputs_of(item) if is_own(item) else {} for item in obj.modifiers}
         self._groups = {item.name: item.node_group for item in obj.modifiers if is_own(item)}
         self._own = {name: _plain(obj[name]) for name in _own_names(obj)}
@@ -70,6 +74,11 @@ class _State:
         obj = self._obj
         if obj.data != self._data:
             obj.data = self._data
+        if any(getattr(obj, name) != value for name, value in self._parent.items()):
+            for name, value in self._parent.items():
+                setattr(obj, name, value)
+        if obj.matrix_parent_inverse != self._inverse:
+            obj.matrix_parent_inverse = self._inverse
         if obj.matrix_basis != self._place:
             obj.matrix_world = self._world  # which the other leaves as it is until the next update
             obj.matrix_basis = self._place

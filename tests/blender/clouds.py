@@ -75,6 +75,7 @@ def everything(obj):
         ),
         "object": (obj.name, obj.mode, data and data.name, [list(row) for row in obj.matrix_world]),
         "seen": (obj.select_get(), obj.hide_get(), obj.hide_viewport, obj.hide_render, obj.active_shape_key_index),
+        "parent": (obj.parent and obj.parent.name, obj.parent_type, obj.parent_bone, repr(obj.matrix_parent_inverse)),
         "properties": _own(obj),
         "modifiers": [
             (item.name, item.type, item.show_viewport, item.show_render, sorted(_inputs(item).items()))

@@ -89,13 +89,17 @@ class Skinner:
 
     Parameters
     ----------
-    weights : array_like or sparse array, (n, b)
-        As of `skin`.
+    weights : array_like or sparse array, (n, b), or array_like, (n, k)
+        As of `skin`, or of those bones of each point that are named.
+    bones : array_like of int, (n, k), optional
+        Of which bone each weight is.
+    count : int, optional
+        How many bones there are, if they are named; by default so many that all names fit.
 
     Raises
     ------
     InvalidPointsError
-        Weights that are no table, or not finite.
+        Weights that are no table, or not finite, or of bones that there are not.
 
     See Also
     --------
@@ -116,8 +120,8 @@ class Skinner:
     [0. 0. 2.]
     """
 
-    def __init__(self, weights: Any) -> None:
-        table = _check_table(weights, (None, None))
+    def __init__(self, weights: Any, bones: ArrayLike | None = None, count: int | None = None) -> None:
+        table = _check_table(weights, (None, None)) if bones is None else _named_table(weights, bones, count)
         self._shape = table.shape
         self._blocks = [_Block(rows, table[rows]) for rows in blocks(table.shape[0], _BLOCK)]
 
@@ -269,6 +273,20 @@ def _check_table(weights: Any, shape: tuple[int | None, int | None]) -> sparse.c
     table = sparse.csr_array(weights, dtype=np.float64)
     table.sum_duplicates()
     return table
+
+
+def _named_table(weights: ArrayLike, bones: ArrayLike, count: int | None) -> sparse.csr_array:
+    """Return the weights of named bones, (n, k) both, as a sparse array, (n, count)."""
+    named = check_array(bones, "Bones", [(None, None)], "Give the numbers of the bones of each point.", "iu")
+    most = int(named.max(initial=-1)) + 1 if count is None else count
+    if named.size and not 0 <= named.min() <= named.max() < most:
+        raise InvalidPointsError(f"There are {most} bones, and others are named. Give numbers from 0 to {most - 1}.")
+    advice = "Give a weight for each bone that is named."
+    values = as_doubles(check_array(weights, "Weights", [named.shape], advice, "biuf"))
+    ends = named.shape[1] * np.arange(len(named) + 1)
+    table = sparse.csr_array((values.ravel(), named.ravel(), ends), shape=(len(named), most))
+    table.eliminate_zeros()
+    return _check_table(table, table.shape)
 
 
 def _largest(table: sparse.csr_array) -> Ints:
