@@ -88,6 +88,12 @@ class Handles:
     def written(self, obj):
         return [item.empty for item in obj.meshfree.deform.handle_items if is_there(item.empty)]
 
+    def held(self, obj):
+        return ""
+
+    def kept(self, obj):
+        return ""
+
     def put_back(self, context, obj):
         """See `Kind`; handles of the original of a copy are not moved, and points only if their number is unchanged."""
         settings, data = obj.meshfree.deform, obj.data

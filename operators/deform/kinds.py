@@ -55,6 +55,12 @@ class Kind(Protocol):
     def written(self, obj) -> list:
         """Return the objects that operators on a bound object change, beside it."""
 
+    def held(self, obj) -> str:
+        """Return why the points cannot be taken over as they are shown, and what to do; empty if they can."""
+
+    def kept(self, obj) -> str:
+        """Return why what an object follows is not reset with it, and what to do; empty if it is."""
+
     def put_back(self, context, obj):
         """Reset what an object follows, and its points to rest, as far as that belongs to it."""
 

@@ -35,7 +35,7 @@ from ..tools.select import SelectionOperator, groups_changed, selected
 from . import live
 from .binding import WRITES, forget, is_bound, stale_reason
 from .follower import Follower
-from .handle_kind import keyed_empties, record, renew
+from .handle_kind import Handles, keyed_empties, record, renew
 from .handles import constrain, copied_from, edited_rows, handled_object, plan_binding, read_constraints
 from .kinds import kind_of
 from .nodes import add_deform, add_shape, find_deform, is_baked, show_live, stored_name
@@ -97,6 +97,9 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
 
     def plan(self, context, obj):
         settings = obj.meshfree.deform
+        if is_bound(obj) and settings.kind != Handles.name:
+            followed = kind_of(obj).followed
+            raise PointCloudError(f'"{obj.name}" follows the {followed} of an armature. Apply or unbind it first.')
         if self.at_once and settings.handles and not handle_names(obj):
             return _plan_ends(context, obj)
         constraints = read_constraints(obj)
@@ -300,6 +303,11 @@ class MESHFREE_OT_deform_apply(BoundOperator, bpy.types.Operator):
         default=False,
     )
 
+    @classmethod
+    def obstacle(cls, context):
+        reason = super().obstacle(context)
+        return reason or kind_of(cls.subject(context)).held(cls.subject(context))
+
     def invoke(self, context, event):
         """Ask, where keyframes would be lost."""
         if bpy.app.background or not keyed_empties(self.subject(context)):
@@ -324,6 +332,11 @@ class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.deform_to_shape_key"
     bl_label = "To Shape Key"
+
+    @classmethod
+    def obstacle(cls, context):
+        reason = super().obstacle(context)
+        return reason or kind_of(cls.subject(context)).held(cls.subject(context))
 
     def change(self, context, obj):
         if obj.type != "MESH" or has_splats(obj.data):  # shape keys hold positions only
@@ -369,6 +382,11 @@ class MESHFREE_OT_deform_reset(BoundOperator, bpy.types.Operator):
     bl_idname = "meshfree.deform_reset"
     bl_label = "Reset"
     works_stale = True
+
+    @classmethod
+    def obstacle(cls, context):
+        reason = super().obstacle(context)
+        return reason or kind_of(cls.subject(context)).kept(cls.subject(context))
 
     def change(self, context, obj):
         kind_of(obj).put_back(context, obj)

@@ -92,6 +92,14 @@ class Bones:
     def written(self, obj):
         return []
 
+    def held(self, obj):
+        if takes_groups(obj):
+            return "Its Armature modifier moves the points. Apply that"
+        return ""
+
+    def kept(self, obj):
+        return "The pose is that of the armature. Clear it there, in Pose Mode: Pose, Clear Transform"
+
     def put_back(self, context, obj):
         """The pose of the armature is not the object's own."""
 
@@ -103,6 +111,11 @@ class Bones:
             return f"{obj.name}: {len(positions):,} points stay where they are now, and no longer follow {name}"
 
         return take
+
+
+def followers_of(armature) -> list:
+    """Return the objects that are bound to the bones of an armature."""
+    return [obj for obj in binding.bound_objects() if obj.meshfree.deform.armature == armature]
 
 
 class Bound(NamedTuple):

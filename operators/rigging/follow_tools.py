@@ -52,4 +52,4 @@ class MESHFREE_OT_bind_armature(ApplicationOperator, bpy.types.Operator):
         return [*notices, f"{obj.name}: {len(bound.rest):,} points follow {len(bound.names)} bones of {armature.name}"]
 
 
-TOOLS = (Registration(MESHFREE_OT_bind_armature, panel=Row("Rig", 2, 1), menu=Row("Object", 8, 12)),)
+TOOLS = (Registration(MESHFREE_OT_bind_armature, menu=Row("Object", 8, 12)),)
