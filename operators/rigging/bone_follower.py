@@ -9,6 +9,7 @@ from ..deform.follower import Moved, carried_along
 from ..deform.pose import Pose, State
 from ..objects.carried import local_gradients
 
+_ROUNDING = 1e-5  # of the lengths of axes, through a chain of bones
 _STILL = 1e-6  # of the extent of the points, and of a turn: less is a pose at rest
 
 
@@ -76,6 +77,8 @@ class BoneFollower:
     def __init__(self, binding: BoneBinding):
         self.binding, self.last, self.notices = binding, {}, []
         self._skinner = core.Skinner(binding.weights, binding.bones, binding.count)
+        self._rest, self._size = binding.rest.astype(np.float64), np.ptp(binding.rest, axis=0).max()
+        self._placed = np.zeros((4, 4)), None  # the last transform to the armature's space, and the points there
 
     def prepare(self, progress):
         """Return this."""
@@ -87,17 +90,20 @@ class BoneFollower:
         Harmonics, which take longest, are left out of a result that shall be quick; without them it is settled.
         """
         bound = self.binding
-        still = np.zeros(bound.rest.shape)
         needs_gradients = bound.splats is not None or discs is not None
-        if _is_at_rest(bound.rest, pose) or not (bound.places or needs_gradients):
-            return Moved(None, still, {}, State.SETTLED, True)
-        linear, shift = pose.relative[:3, :3], pose.relative[:3, 3]
-        points = bound.rest @ linear.T + shift
+        if self._is_at_rest(pose) or not (bound.places or needs_gradients):
+            return Moved(None, np.zeros(bound.rest.shape), {}, State.SETTLED, True)
+        points = self._points(pose.relative)
         found = self._skinner.move(
             points, pose.changes, dual_quaternions=pose.preserve_volume, gradients=needs_gradients
         )
         moved, gradients = found if needs_gradients else (found, None)
-        displacement = (moved - points) @ np.linalg.inv(linear).T if bound.places else still
+        linear = pose.relative[:3, :3]
+        if bound.places:
+            moved -= points
+            displacement = moved @ np.linalg.inv(linear).T
+        else:
+            displacement = np.zeros(bound.rest.shape)
         waits = state is State.QUICK and bound.splats is not None and bound.splats.harmonics.shape[1] > 0
         state = State.QUICK if waits else State.SETTLED
         carried = {}
@@ -106,9 +112,29 @@ class BoneFollower:
             carried = carried_along(bound.splats, discs, bound.rest + displacement, gradients, state)
         return Moved(None, displacement, carried, state, True)
 
+    def _points(self, relative):
+        """Return the points at rest in the armature's space, which mostly is where it was."""
+        known, points = self._placed
+        if points is None or not np.array_equal(known, relative):
+            points = self._rest @ relative[:3, :3].T + relative[:3, 3]
+            self._placed = relative, points
+        return points
 
-def _is_at_rest(rest, pose):
-    """Whether all bones are where they were at rest."""
-    change = np.abs(pose.changes - np.eye(4)[:3])
-    size = np.ptp(rest, axis=0).max() * np.linalg.norm(pose.relative[:3, :3], 2)
-    return change[:, :, :3].max(initial=0.0) <= _STILL and change[:, :, 3].max(initial=0.0) <= _STILL * size
+    def _is_at_rest(self, pose):
+        """Whether all bones are where they were at rest."""
+        change = np.abs(pose.changes - np.eye(4)[:3])
+        size = self._size * np.linalg.norm(pose.relative[:3, :3], 2)
+        return change[:, :, :3].max(initial=0.0) <= _STILL and change[:, :, 3].max(initial=0.0) <= _STILL * size
+
+
+def without_rounding(changes):
+    """Return matrices, (b, 3, 4), of which those that are rotations but for rounding in single precision are exact.
+
+    Dual quaternions of bones that do not stretch are blended faster.
+    """
+    linear = changes[:, :, :3]
+    error = np.abs(linear.transpose(0, 2, 1) @ linear - np.eye(3)).max(axis=(1, 2), initial=0.0)
+    turns = np.moveaxis(core.algebra.nearest_rotations(np.moveaxis(linear, 0, 2)), 2, 0)
+    result = changes.copy()
+    result[:, :, :3] = np.where((error <= _ROUNDING)[:, None, None], turns, linear)
+    return result

@@ -569,7 +569,7 @@ class TestMeshes:
         angle, height = (each.ravel() for each in np.meshgrid(np.arange(24) * pi / 12, np.linspace(0.0, 3.0, 24)))
         points = np.column_stack([0.4 * np.cos(angle), 0.4 * np.sin(angle), height])
         obj = add_object(points, "Tube")
-        bpy.ops.meshfree.surface()
+        bpy.ops.meshfree.show_surface()
         bound(obj, armature, weights_along(rest(obj), (1.0, 2.0, 3.0)))
         return obj, armature
 
@@ -604,7 +604,7 @@ class TestMeshes:
             with pytest.raises(RuntimeError, match="Apply that"):
                 tool()
         assert bpy.ops.meshfree.deform_unbind() == {"FINISHED"}
-        assert [item.type for item in obj.modifiers][0] == "ARMATURE"
+        assert next(item.type for item in obj.modifiers) == "ARMATURE"
 
 
 def texts(obj):
