@@ -39,7 +39,7 @@ KEPT = {
 RESULTS = {"total_area", "trusted_area", "point_count", "subset_count"}
 RESULTS |= {"component_count", "boundary_count", "left_out_count"}
 BINDING = {"name", "is_bound", "matrix", "handle_items", "binding_id", "point_count", "fingerprint"}
-BINDING |= {"groups_used", "settings_used"}
+BINDING |= {"groups_used", "settings_used", "kind", "armature", "bone_items"}
 
 
 def read(path):

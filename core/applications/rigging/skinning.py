@@ -14,7 +14,7 @@ from ...arguments import as_doubles, check_array, check_finite, check_positions,
 from ...errors import InvalidPointsError
 from ...types import Bools, Floats, Ints
 
-_BLOCK = 1 << 12  # points worked on at one time, which stay in the cache of the processor
+_BLOCK = 1 << 13  # points worked on at one time, which stay in the cache of the processor
 _STRETCHED = 1e-12  # share of a stretch that is no error of rounding
 
 
