@@ -9,7 +9,7 @@ from ..deform.follower import Moved, carried_along
 from ..deform.pose import Pose, State
 from ..objects.carried import local_gradients
 
-_ROUNDING = 1e-5  # of the lengths of axes, through a chain of bones
+_ROUNDING = 2e-6  # of the lengths of axes, in single precision and through a chain of bones
 _STILL = 1e-6  # of the extent of the points, and of a turn: less is a pose at rest
 
 
@@ -95,7 +95,11 @@ class BoneFollower:
             return Moved(None, np.zeros(bound.rest.shape), {}, State.SETTLED, True)
         points = self._points(pose.relative)
         found = self._skinner.move(
-            points, pose.changes, dual_quaternions=pose.preserve_volume, gradients=needs_gradients
+            points,
+            pose.changes,
+            dual_quaternions=pose.preserve_volume,
+            gradients=needs_gradients,
+            rounding=_ROUNDING,
         )
         moved, gradients = found if needs_gradients else (found, None)
         linear = pose.relative[:3, :3]
@@ -125,16 +129,3 @@ class BoneFollower:
         change = np.abs(pose.changes - np.eye(4)[:3])
         size = self._size * np.linalg.norm(pose.relative[:3, :3], 2)
         return change[:, :, :3].max(initial=0.0) <= _STILL and change[:, :, 3].max(initial=0.0) <= _STILL * size
-
-
-def without_rounding(changes):
-    """Return matrices, (b, 3, 4), of which those that are rotations but for rounding in single precision are exact.
-
-    Dual quaternions of bones that do not stretch are blended faster.
-    """
-    linear = changes[:, :, :3]
-    error = np.abs(linear.transpose(0, 2, 1) @ linear - np.eye(3)).max(axis=(1, 2), initial=0.0)
-    turns = np.moveaxis(core.algebra.nearest_rotations(np.moveaxis(linear, 0, 2)), 2, 0)
-    result = changes.copy()
-    result[:, :, :3] = np.where((error <= _ROUNDING)[:, None, None], turns, linear)
-    return result

@@ -17,7 +17,7 @@ from ..objects.handlers import add_handlers, notify, remove_handlers
 from ..objects.modifiers import is_own
 from ..objects.reading import read_points
 from ..objects.splats import has_splats, read_splats
-from .bone_follower import BoneBinding, BoneFollower, BonePose, without_rounding
+from .bone_follower import BoneBinding, BoneFollower, BonePose
 from .bones import bone_matrices, envelopes
 from .weights import BONES, NAMES, WEIGHTS, has_weights, takes_groups, weight_names, weight_table
 
@@ -47,7 +47,7 @@ class Bones:
         armature = obj.meshfree.deform.armature
         posed = armature if depsgraph is None else armature.evaluated_get(depsgraph)
         now = bone_matrices(posed.pose.bones, _names(obj), "matrix")
-        changes = without_rounding((now @ np.linalg.inv(_rest(obj)))[:, :3])
+        changes = (now @ np.linalg.inv(_rest(obj)))[:, :3]
         relative, key, preserve = _to_armature(obj, armature, depsgraph), self.key(obj), _preserves_volume(obj)
         checksums = [zlib.crc32(repr((key, preserve, carries(obj))).encode()), 0]
         numbers = np.concatenate([checksums, relative[:3].ravel(), changes.ravel()])

@@ -89,6 +89,25 @@ class TestSkin:
         with pytest.raises(core.InvalidPointsError, match="matrices of 2"):
             skinner.move(self.points, poses[0][:2])
 
+    def test_stretches_by_rounding_are_left_out_only_where_asked_for(self):
+        matrices = np.array([turned((1, 0, 1), 0.8), turned((0, 1, 0), -0.9), turned((1, 1, 1), 2.0)])
+        skinner = core.Skinner(np.eye(3)[np.arange(200) % 3])
+        rigid = skinner.move(self.points, matrices, dual_quaternions=True)
+        matrices[:, :, :3] *= 1.0 + 1e-6
+        found = skinner.move(self.points, matrices, dual_quaternions=True)
+        assert found == pytest.approx((1.0 + 1e-6) * rigid, abs=1e-12)
+        assert skinner.move(self.points, matrices, dual_quaternions=True, rounding=2e-6) == pytest.approx(
+            rigid, abs=1e-12
+        )
+
+    def test_named_bones_are_the_columns_of_a_table(self):
+        matrices = [turned((1, 0, 1), 0.8), turned((0, 1, 0), -0.9), turned((1, 1, 1), 2.0)]
+        order = np.argsort(self.weights, axis=1)
+        named = core.Skinner(np.take_along_axis(self.weights, order, axis=1), order)
+        assert named.move(self.points, matrices) == pytest.approx(core.skin(self.points, self.weights, matrices))
+        with pytest.raises(core.InvalidPointsError, match="There are 2 bones"):
+            core.Skinner(self.weights, order, 2)
+
     def test_a_bent_bar_keeps_its_volume_by_screws(self):
         """A quarter of a turn about y: linear blending halves the cross section in the bend, screws do not."""
         angle = np.linspace(0, 2 * np.pi, 40, endpoint=False)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from ...algebra import blocks, nearest_rotations, on_all_cores
-from ...arguments import as_doubles, check_array, check_finite, check_positions, check_switches
+from ...arguments import as_doubles, check_array, check_finite, check_positions, check_switches, not_negative
 from ...errors import InvalidPointsError
 from ...types import Bools, Floats, Ints
 
@@ -126,7 +126,13 @@ class Skinner:
         self._blocks = [_Block(rows, table[rows]) for rows in blocks(table.shape[0], _BLOCK)]
 
     def move(
-        self, points: ArrayLike, matrices: ArrayLike, *, dual_quaternions: bool = False, gradients: bool = False
+        self,
+        points: ArrayLike,
+        matrices: ArrayLike,
+        *,
+        dual_quaternions: bool = False,
+        gradients: bool = False,
+        rounding: float = 0.0,
     ) -> Any:
         """Move points with the bones; see `skin`.
 
@@ -135,6 +141,9 @@ class Skinner:
         points : array_like, (n, 3)
         matrices : array_like, (b, 4, 4) or (b, 3, 4)
         dual_quaternions, gradients : bool
+        rounding : float
+            What in matrices counts as an error of rounding: dual quaternions leave out stretches by such shares, which
+            is faster.
 
         Returns
         -------
@@ -146,6 +155,8 @@ class Skinner:
         ------
         InvalidPointsError
             Points or matrices of another number than the weights, or not finite.
+        PointCloudError
+            A rounding below zero.
         """
         check_switches(dual_quaternions=dual_quaternions, gradients=gradients)
         count, bones = self._shape
@@ -155,7 +166,8 @@ class Skinner:
             raise InvalidPointsError(
                 f"There are weights of {bones} bones, and matrices of {len(given)}. Give one of each."
             )
-        bend = _Screws(given).blended if dual_quaternions else partial(_blended_matrices, given)
+        least = max(not_negative(rounding, "rounding"), _STRETCHED)
+        bend = _Screws(given, least).blended if dual_quaternions else partial(_blended_matrices, given)
         moved, linears = np.empty((count, 3)), np.empty((count, 3, 3) if gradients else 0)
 
         def work(block: _Block) -> None:
@@ -223,12 +235,12 @@ class _Screws:
     place. That is linear, and so is the blend.
     """
 
-    def __init__(self, given: Floats) -> None:
+    def __init__(self, given: Floats, rounding: float) -> None:
         linear = given[:, :, :3]
         turn = np.moveaxis(nearest_rotations(np.ascontiguousarray(np.moveaxis(linear, 0, 2))), 2, 0)
         self._real = _quaternions(turn)
         stretch, none = linear - turn, np.zeros(len(given))
-        self._stretched = bool(np.abs(stretch).max(initial=0.0) > _STRETCHED)
+        self._stretched = bool(np.abs(stretch).max(initial=0.0) > rounding)
         columns = [given[:, :, 3], *(np.moveaxis(stretch, 2, 0) if self._stretched else ())]
         duals = [0.5 * _product((none, *column.T), self._real.T).T for column in columns]
         self._values = np.concatenate([self._real, *duals], axis=1)
