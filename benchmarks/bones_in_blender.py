@@ -1,6 +1,6 @@
 """How long points and splats take to follow an armature in Blender: ``python bones_in_blender.py ZIP [splats.ply]``.
 
-For a Python that has bpy. Installs the extension's zip into a folder of its own. Lets 100,000 points, and the splats of a
+For a Python that has bpy. Installs the extension's zip into a folder of its own. Lets 100,000 points, and splats of a
 file, follow 60 bones, four a point: the median of the processor's time from the change of a pose to the evaluated
 object, which other work on the machine does not lengthen.
 """
