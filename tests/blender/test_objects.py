@@ -505,7 +505,7 @@ class TestConverting:
 
     def test_what_is_refused(self, bound):
         before = everything(bound)
-        with pytest.raises(RuntimeError, match="is bound to handles, which would be lost"):
+        with pytest.raises(RuntimeError, match="is bound, which would be lost"):
             bpy.ops.meshfree.convert(target="POINTCLOUD")
         with pytest.raises(RuntimeError, match='"Cloud" is a mesh already'):
             bpy.ops.meshfree.convert(target="MESH")
