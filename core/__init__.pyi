@@ -69,8 +69,10 @@ from .applications.motion.reaction import ReactionDiffusion as ReactionDiffusion
 from .applications.motion.wave_modes import wave_modes as wave_modes
 from .applications.rigging.bone_weights import bone_weights as bone_weights
 from .applications.rigging.bone_weights import nearest_bones as nearest_bones
+from .applications.rigging.envelopes import envelope_share as envelope_share
 from .applications.rigging.inpainting import inpaint as inpaint
 from .applications.rigging.inpainting import smooth_weights as smooth_weights
+from .applications.rigging.skinning import Skinner as Skinner
 from .applications.rigging.skinning import skin as skin
 from .applications.spectral.descriptors import heat_kernel_signature as heat_kernel_signature
 from .applications.spectral.descriptors import signature_energies as signature_energies

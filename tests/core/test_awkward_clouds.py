@@ -444,6 +444,9 @@ def calls():
     yield core.inpaint, on, {"known": [0, 299], "values": [0.0, 1.0], "biharmonic": True}
     yield core.smooth_weights, on, {"weights": np.ones((n, 2)), "length": 0.1, "locked": [0]}
     yield core.skin, {"gradients": False}, {"points": points, "weights": np.ones((n, 1)), "matrices": np.eye(4)[None]}
+    yield core.Skinner(np.ones((n, 1))).move, {"gradients": False}, {"points": points, "matrices": np.eye(4)[None]}
+    ends = {"heads": points, "tails": 2.0 * points, "head_radii": np.ones(n), "tail_radii": np.ones(n)}
+    yield core.envelope_share, {}, {"points": points, **ends, "distances": np.ones(n)}
     yield core.solve_poisson, on, {"source": points[:, 2], "fixed": [0], "fixed_values": [0.0]}
     yield core.geodesic_distance, on, {"sources": [0]}
     yield core.Geodesics(laplacian).distance, {}, {"sources": [0]}
