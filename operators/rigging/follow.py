@@ -15,6 +15,7 @@ from ..objects.attributes import point_count, read_attribute
 from ..objects.carried import carries
 from ..objects.handlers import add_handlers, notify, remove_handlers
 from ..objects.modifiers import is_own
+from ..objects.place import moves_with
 from ..objects.reading import read_points
 from ..objects.splats import has_splats, read_splats
 from .bone_follower import BoneBinding, BoneFollower, BonePose
@@ -161,7 +162,7 @@ def plan_bound(context, obj, armature) -> Bound:
         raise PointCloudError(f'"{obj.name}" follows handles. Apply or unbind it first.')
     if not has_weights(obj):
         raise PointCloudError(f'"{obj.name}" has no weights of bones. Run Automatic Weights first.')
-    if _moves_with(armature, obj):
+    if moves_with(armature, obj):
         raise PointCloudError(
             f'"{armature.name}" moves with "{obj.name}", its parent. Clear the parent of the armature (Alt P).'
         )
@@ -218,13 +219,6 @@ def set_parent(obj, armature):
     inverse = armature.matrix_world.inverted() @ _from_parent(obj)
     obj.parent, obj.parent_type = armature, "OBJECT"
     obj.matrix_parent_inverse = inverse
-
-
-def _moves_with(obj, other):
-    """Whether an object is another one, a child of it, or a child of such."""
-    while obj is not None and obj != other:
-        obj = obj.parent
-    return obj is not None
 
 
 def _from_parent(obj):
