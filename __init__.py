@@ -13,7 +13,7 @@ def _modules():
     if not missing.scipy_serves():
         return (missing,)
     from .operators import rigging, tools
-    from .operators.deform import bake, live
+    from .operators.deform import bake, handle_kind, live
     from .operators.deform import tools as deform
     from .operators.files import command, exporting, importing
     from .operators.objects import counting, motion, motion_files, notices, settings
@@ -47,6 +47,7 @@ def _modules():
         motion_files,
         job,
         *_within(tools),
+        handle_kind,
         deform,
         bake,
         live,

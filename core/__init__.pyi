@@ -70,12 +70,14 @@ from .applications.motion.reaction import ReactionDiffusion as ReactionDiffusion
 from .applications.motion.wave_modes import wave_modes as wave_modes
 from .applications.rigging.bone_weights import bone_weights as bone_weights
 from .applications.rigging.bone_weights import nearest_bones as nearest_bones
+from .applications.rigging.envelopes import envelope_share as envelope_share
 from .applications.rigging.inpainting import inpaint as inpaint
 from .applications.rigging.inpainting import inpaint_labels as inpaint_labels
 from .applications.rigging.mixing import are_normalized as are_normalized
 from .applications.rigging.mixing import mix_weights as mix_weights
 from .applications.rigging.places import SurfaceMatch as SurfaceMatch
 from .applications.rigging.places import match_surface as match_surface
+from .applications.rigging.skinning import Skinner as Skinner
 from .applications.rigging.skinning import skin as skin
 from .applications.rigging.smoothing import smooth_weights as smooth_weights
 from .applications.rigging.transfer import transfer_labels as transfer_labels

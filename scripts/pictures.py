@@ -15,6 +15,7 @@ import numpy as np
 from mathutils import Vector
 
 import demo
+import follow_pictures
 import package
 import paper_pictures
 import rig_pictures
@@ -467,6 +468,7 @@ PICTURES = {
     "motion_wave": motion("WAVE", 75, width=0.5, distance=6.0, height=0.25),
     "motion_reaction": motion("REACTION", 100, distance=0.55),
     "motion_front": motion("FRONT", 70, width=0.4),
+    **follow_pictures.PICTURES,
     **paper_pictures.PICTURES,
     **rig_pictures.PICTURES,
     **scan_pictures.PICTURES,
@@ -485,7 +487,7 @@ def main():
     OUTPUT.mkdir(parents=True, exist_ok=True)
     with studio.extension():
         for name in names:
-            if name in scan_pictures.PICTURES and not scan_pictures.FOLDER:
+            if name in {**scan_pictures.PICTURES, **follow_pictures.PICTURES} and not scan_pictures.FOLDER:
                 print(f"left out {name}: MESHFREE_SCANS names no folder of scans", flush=True)
                 continue
             began, path = perf_counter(), OUTPUT / f"{name}.png"

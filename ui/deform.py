@@ -4,7 +4,10 @@ import bpy
 
 from ..operators import registration
 from ..operators.deform import live
-from ..operators.deform.binding import copied_from, handled_object, is_bound
+from ..operators.deform.binding import is_bound
+from ..operators.deform.handle_kind import Handles
+from ..operators.deform.handles import copied_from, handled_object
+from ..operators.deform.kinds import kind_of
 from ..operators.deform.nodes import find_deform, is_baked
 from ..operators.deform.pose import State
 from ..operators.objects.groups import handle_names
@@ -31,6 +34,9 @@ class MESHFREE_PT_deform(SidebarPanel, bpy.types.Panel):
         if obj != context.object:
             draw_text(layout, context, f"Moves handles of {obj.name}", "EMPTY_DATA")
         settings = obj.meshfree.deform
+        if is_bound(obj) and kind_of(obj).name != Handles.name:
+            draw_text(layout, context, f"Follows {kind_of(obj).followed}: see Rig", "INFO")
+            return
         split_properties(layout, context)
         column = layout.column(align=True)
         search_group(column, settings, "handles", obj)
@@ -53,29 +59,45 @@ class MESHFREE_PT_deform(SidebarPanel, bpy.types.Panel):
         if not is_bound(obj):
             layout.operator("meshfree.deform_bind")
             return
-        _draw_state(layout, context, obj)
-        layout.operator("meshfree.deform_bind", text="Bind Again")
-        modifier = find_deform(obj)
-        if modifier is not None:
-            layout.prop(*input_property(modifier, "Strength"), text="Strength", slider=True)
-        if not context.scene.render.use_lock_interface:
-            column = layout.column(align=True)
-            draw_text(column, context, "Blender may crash in renders", "ERROR")
-            column.prop(context.scene.render, "use_lock_interface")
-        grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
-        hidden = "deform_bake" if is_baked(obj) else "deform_free"
-        for group in registration.groups("panel", self.bl_label):
-            for tool in group:
-                if tool.name != hidden:
-                    grid.operator(tool.operator.bl_idname)
+        draw_binding(layout, context, obj, "meshfree.deform_bind")
+
+
+def draw_binding(layout, context, obj, bind: str, without=()):
+    """Draw the state of a bound object, and what can be done with it.
+
+    Parameters
+    ----------
+    layout : bpy.types.UILayout
+    context : bpy.types.Context
+    obj : bpy.types.Object
+    bind : str
+        The operator that binds it again.
+    without : sequence of str
+        Names of tools that are not drawn.
+    """
+    _draw_state(layout, context, obj)
+    layout.operator(bind, text="Bind Again")
+    modifier = find_deform(obj)
+    if modifier is not None:
+        layout.prop(*input_property(modifier, "Strength"), text="Strength", slider=True)
+    if not context.scene.render.use_lock_interface:
+        column = layout.column(align=True)
+        draw_text(column, context, "Blender may crash in renders", "ERROR")
+        column.prop(context.scene.render, "use_lock_interface")
+    grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
+    hidden = {"deform_bake" if is_baked(obj) else "deform_free", *without}
+    for group in registration.groups("panel", MESHFREE_PT_deform.bl_label):
+        for tool in group:
+            if tool.name not in hidden:
+                grid.operator(tool.operator.bl_idname)
 
 
 _STATES = {  # text, with a detail, and icon in the panel
     State.BAKED: ("Baked. {}", "INFO"),
     State.STALE: ("Not up to date. {}", "ERROR"),
     State.PREPARING: ("Not up to date. Binding: {}", "SORTTIME"),
-    State.QUICK: ("Follows its handles roughly. Exact soon: {}", "SORTTIME"),
-    State.SETTLED: ("Bound: follows its handles", "CHECKMARK"),
+    State.QUICK: ("Follows its {followed} roughly. Exact soon: {}", "SORTTIME"),
+    State.SETTLED: ("Bound: follows its {followed}", "CHECKMARK"),
 }
 
 
@@ -85,7 +107,7 @@ def _draw_state(layout, context, obj):
     text, icon = _STATES[state]
     if state is State.STALE and copied_from(obj) is not None:
         text = "Copy. {}"
-    draw_text(layout, context, text.format(detail), icon)
+    draw_text(layout, context, text.format(detail, followed=kind_of(obj).followed), icon)
 
 
 CLASSES = (MESHFREE_PT_deform,)

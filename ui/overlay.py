@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 
 from ..core import PointCloudError
-from ..operators.deform.binding import handled_object
+from ..operators.deform.handles import handled_object
 from ..operators.objects.attributes import mode_number
 from ..operators.objects.result import read_eigenvalues
 from ..operators.objects.units import EIGENVALUE_POWER, unit

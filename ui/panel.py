@@ -4,7 +4,7 @@ import bpy
 
 from ..command.quantities import APPLICATIONS, DEVIATION, RESULTS, eigenvector_name, quantity
 from ..operators import registration
-from ..operators.deform.binding import handled_object
+from ..operators.deform.handles import handled_object
 from ..operators.objects.attributes import DISC, mode_number, point_count
 from ..operators.objects.colors import own_colors, own_material, shows_own_material
 from ..operators.objects.modifiers import has_input, input_property, is_own, is_sequence

@@ -4,6 +4,7 @@ import bpy
 
 from ..operators.objects.reading import obstacle
 from ..operators.rigging.bones import chosen_armature
+from .follow import draw_follow
 from .panel import SidebarPanel, draw_tools
 from .wrapping import draw_text
 
@@ -25,6 +26,7 @@ class MESHFREE_PT_rig(SidebarPanel, bpy.types.Panel):
         if armature is not None:
             draw_text(self.layout, context, f"Bones of {armature.name}", "OUTLINER_OB_ARMATURE")
         draw_tools(self.layout, self.bl_label)
+        draw_follow(self.layout, context, context.object)
 
 
 CLASSES = (MESHFREE_PT_rig,)

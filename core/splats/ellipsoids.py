@@ -8,7 +8,6 @@ from ..types import Floats, Ints
 _BLOCK = 1 << 13  # ellipsoids worked on at one time
 _SWEEPS = 12  # of Jacobi's method; six reach full precision even for axes of a millionth
 _TOLERANCE = 1e-14  # of the cosine between two axes, below which they are not rotated
-_LAST = 1e-8  # cosines below which no further sweep is needed, which leaves about their squares
 _LOST = 1e-14  # of the longest axis
 _OTHERS = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])  # components of a quaternion beside one
 
@@ -89,19 +88,25 @@ def mapped(scales: Floats, rotations: Floats, gradients: Floats) -> tuple[Floats
 
 
 def _split(scales: Floats, rotations: Floats, gradients: Floats) -> tuple[Floats, Floats]:
-    """Return half axes and rotations of a block of mapped ellipsoids."""
+    """Return half axes and rotations of a block of mapped ellipsoids, as accurate as the type of the given ones."""
     maps = np.ascontiguousarray(np.moveaxis(gradients, 0, 2), dtype=np.float64)  # a tenth of the time of strided ones
     axes = np.einsum("abn,bcn->acn", maps, matrices_of(rotations)) * np.asarray(scales, dtype=np.float64).T
     size = np.sqrt(np.einsum("acn,acn->n", axes, axes))
     axes = axes / np.where(size > 0.0, size, 1.0)
+    last = np.sqrt(np.finfo(np.result_type(scales, rotations)).eps)  # leaves about its square
     rows, left = np.arange(len(scales)), axes
     for _ in range(_SWEEPS):
         slant = np.max([_orthogonalize(left, p, q) for p, q in ((0, 1), (0, 2), (1, 2))], axis=0)
-        axes[:, :, rows] = left
-        going = slant > _LAST
+        going = slant > last
+        if going.all():
+            continue
+        if left is not axes:
+            axes[:, :, rows] = left
         rows, left = rows[going], left[:, :, going]
         if not len(rows):
             break
+    else:
+        axes[:, :, rows] = left
     lengths = np.sqrt(np.einsum("acn,acn->cn", axes, axes))
     lost = lengths <= _LOST * lengths.max(axis=0)  # rounding leaves no direction
     unit = axes / np.where(lost, np.inf, lengths)
@@ -122,10 +127,12 @@ def _orthogonalize(axes: Floats, p: int, q: int) -> Floats:
     product = np.einsum("an,an->n", one, other)
     squares = np.einsum("an,an->n", one, one), np.einsum("an,an->n", other, other)
     bound = np.sqrt(squares[0] * squares[1])
-    slanted = np.abs(product) > _TOLERANCE * bound
-    half = np.where(slanted, (squares[1] - squares[0]) / np.where(slanted, 2.0 * product, 1.0), 0.0)
-    tangent = np.where(slanted, np.where(half < 0.0, -1.0, 1.0) / (np.abs(half) + np.sqrt(half * half + 1.0)), 0.0)
+    slant = np.abs(product)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        half = (squares[1] - squares[0]) / (2.0 * product)
+        tangent = np.copysign(1.0, half) / (np.abs(half) + np.sqrt(half * half + 1.0))
+    tangent[~(slant > _TOLERANCE * bound)] = 0.0
     cosine = 1.0 / np.sqrt(tangent * tangent + 1.0)
     sine = cosine * tangent
     axes[:, p], axes[:, q] = cosine * one - sine * other, sine * one + cosine * other
-    return np.abs(product) / np.where(bound > 0.0, bound, 1.0)
+    return np.divide(slant, bound, out=slant, where=bound > 0.0)

@@ -19,6 +19,7 @@ from ..running.ready import reporting
 from ..running.stages import Stages
 from . import live
 from .binding import stale_reason
+from .kinds import kind_of
 from .nodes import baked_suffix, find_deform, is_baked, show_baked
 from .pose import POSE, State, write_displacement
 from .tools import BoundOperator, check_fresh, delete_bake
@@ -99,8 +100,9 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
             if scene is None:
                 raise PointCloudError("The scene was deleted meanwhile. Nothing was baked.")
             if frames and not self._kept.holds():
+                followed = kind_of(obj).followed
                 raise PointCloudError(
-                    f'The handles of "{obj.name}" or the frame were changed meanwhile. Nothing was baked.'
+                    f'The {followed} of "{obj.name}" or the frame were changed meanwhile. Nothing was baked.'
                 )
             scene.frame_set(number)
             self._kept.expect()
@@ -113,7 +115,7 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
         return frames
 
     def leave(self, context):
-        """Restore the frame and the handles."""
+        """Restore the frame and what the points follow."""
         self._kept.put_back()
 
     def finish(self, context, objects, results):
@@ -156,7 +158,7 @@ def _read_frame(data, along):
 
 
 class _Kept:
-    """The frame, handles and displacements before baking."""
+    """The frame, what the points follow, and displacements before baking."""
 
     def __init__(self, scene, obj, along=()):
         self.along = along  # `Carried` that is baked
@@ -173,17 +175,15 @@ class _Kept:
         return scene, find_object(self._uid)
 
     def _now(self):
-        """Read the frame, the binding, and the transforms of the object and of its empties."""
+        """Read the frame, the binding, and the transforms of what moves the points."""
         scene, obj = self.find()
         if scene is None or obj is None:
             return None
-        settings = obj.meshfree.deform
-        things = {item.empty.session_uid: item.empty for item in settings.handle_items if item.empty}
         places = {
-            uid: {name: tuple(getattr(thing, name)) for name in TRANSFORM}
-            for uid, thing in (things | {obj.session_uid: obj}).items()
+            key: {name: tuple(getattr(thing, name)) for name in TRANSFORM}
+            for key, thing in kind_of(obj).movers(obj).items()
         }
-        return scene.frame_current, settings.binding_id, places
+        return scene.frame_current, obj.meshfree.deform.binding_id, places
 
     def expect(self):
         """Keep the present state as the expected one."""
@@ -199,7 +199,7 @@ class _Kept:
         )
 
     def put_back(self):
-        """Restore the state; handles moved meanwhile are left alone."""
+        """Restore the state; what was moved meanwhile is left alone."""
         scene, obj = self.find()
         if scene is None:
             return
@@ -208,8 +208,9 @@ class _Kept:
         scene.frame_set(frame, subframe=subframe)
         if not holds:
             return
-        for uid, place in self._places[2].items():
-            thing = find_object(uid)
+        things = kind_of(obj).movers(obj)
+        for key, place in self._places[2].items():
+            thing = things[key]
             for name, value in place.items():
                 if tuple(getattr(thing, name)) != value:  # moved after its keyframe
                     setattr(thing, name, value)
@@ -219,7 +220,7 @@ class _Kept:
 
 
 class MESHFREE_OT_deform_free(BoundOperator, bpy.types.Operator):
-    """Remove the baked animation, and let the points follow the handles again"""
+    """Remove the baked animation, and let the points follow handles or bones again"""
 
     bl_idname = "meshfree.deform_free"
     bl_label = "Delete Bake"
@@ -235,7 +236,7 @@ class MESHFREE_OT_deform_free(BoundOperator, bpy.types.Operator):
         delete_bake(obj)
         context.view_layer.update()
         live.update(obj)
-        return f"{obj.name}: follows its handles again"
+        return f"{obj.name}: follows its {kind_of(obj).followed} again"
 
 
 TOOLS = (

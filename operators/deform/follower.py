@@ -8,8 +8,8 @@ import numpy as np
 from ... import core
 from ..objects.attributes import MOVED_DISC
 from ..objects.carried import local_gradients, moved_discs, moved_splats
-from .binding import Binding
-from .pose import Pose, State
+from .handles import Binding, HandlePose
+from .pose import State
 
 
 class Moved(NamedTuple):
@@ -17,8 +17,8 @@ class Moved(NamedTuple):
 
     Attributes
     ----------
-    points : ndarray, (n, 3)
-        Transformed by `Binding.matrix`.
+    points : ndarray, (n, 3), or None
+        What the next step starts from.
     displacement : ndarray, (n, 3)
         In local space.
     carried : dict of str to ndarray
@@ -68,18 +68,28 @@ class Follower:
             progress=progress,
         )
 
+    @property
+    def is_prepared(self) -> bool:
+        """Whether it has the factors for settled results."""
+        return self.exact is not None
+
+    @property
+    def notices(self) -> list:
+        """What is to be told about the binding."""
+        return self.quick.notices
+
     def prepare(self, progress):
         """Factorize for settled results, if necessary, and return this."""
         if self.exact is None:
             self.exact = self._bind(core.Deformer, progress)
         return self
 
-    def move(self, pose: Pose, discs, state: State, start=None, progress=None) -> Moved:
+    def move(self, pose: HandlePose, discs, state: State, start=None, progress=None) -> Moved:
         """Solve for all points in a pose.
 
         Parameters
         ----------
-        pose : Pose
+        pose : HandlePose
         discs : ndarray, (n, 3), or None
             Of the display at rest, normals times radii, to be deformed with the points.
         state : State
@@ -100,7 +110,7 @@ class Follower:
         displacement, carried = (points - rest) @ np.linalg.inv(bound.matrix).T, {}
         if bound.splats is not None or discs is not None:
             gradients = local_gradients(solver.gradients(points), bound.matrix)
-            carried = _carried(bound.splats, discs, bound.rest + displacement, gradients, state)
+            carried = carried_along(bound.splats, discs, bound.rest + displacement, gradients, state)
         return Moved(points, displacement, carried, state, converged)
 
 
@@ -110,8 +120,8 @@ def _is_at_rest(binding, handles):
     return np.allclose(handles, rest[binding.constraints.moved], rtol=0.0, atol=1e-6 * np.ptp(rest, axis=0).max())
 
 
-def _carried(splats, discs, positions, gradients, state):
-    """Return splats or discs after a deformation with these gradients, (n, 3, 3), by attribute."""
+def carried_along(splats, discs, positions, gradients, state):
+    """Return splats, or else discs, after a deformation with these gradients, (n, 3, 3), by attribute."""
     if splats is None:
         return {MOVED_DISC: moved_discs(discs, gradients)}
     if state is State.QUICK:  # harmonics take longest, and can wait

@@ -1,4 +1,4 @@
-"""Bound objects follow their handles: their solvers in memory, and the handlers that update them.
+"""Bound objects follow their handles or bones: their solvers in memory, and the handlers that update them.
 
 A quick update, for dragging and playback, takes one step from the last result with the coarse solver. A settled one is
 exact: it takes all steps on all points from rest, so that it depends on the pose only; its factors are made when first
@@ -10,7 +10,6 @@ import threading
 from collections import defaultdict
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
 from time import perf_counter
 
 import bpy
@@ -22,10 +21,10 @@ from ..objects.carried import discs_at_rest
 from ..objects.handlers import add_handlers, notify, remove_handlers
 from ..running.job import STOPPED, Job, running
 from ..running.ready import TROUBLES, error_text
-from .binding import bound_objects, forget_bound, is_bound, read_binding, stale_reason
-from .follower import Follower
+from .binding import bound_objects, forget_bound, is_bound, stale_reason
+from .kinds import kind_of
 from .nodes import is_baked
-from .pose import Pose, State, binding_key, read_pose, shown_state, write_displacement
+from .pose import Pose, State, shown_state, write_displacement
 
 _IDLE = 0.3  # seconds without a move after which the result is settled
 _TICK = 0.05  # seconds between two checks of a thread
@@ -51,7 +50,7 @@ class _Thread:
 
 @dataclass
 class _Followed:
-    """What is kept in memory of an object that follows its handles.
+    """What is kept in memory of a bound object.
 
     Attributes
     ----------
@@ -90,7 +89,7 @@ class _UpdateLock:
                 self._owner = None
 
 
-_followers = {}  # by `binding_key`
+_followers = {}  # by `Kind.key`
 _followed = defaultdict(_Followed)  # by the object's session_uid, which undo does not change
 _lock = _UpdateLock()
 
@@ -110,33 +109,33 @@ def state(obj) -> tuple:
 
 
 def find(obj):
-    """Return the `Follower` of a bound object, or None."""
-    return _followers.get(binding_key(obj))
+    """Return the follower of a bound object, such as a `Follower`, or None."""
+    return _followers.get(kind_of(obj).key(obj))
 
 
 def is_prepared(follower) -> bool:
-    """Whether a `Follower`, or None, has the factors for settled results."""
-    return follower is not None and follower.exact is not None
+    """Whether a follower, or None, can give settled results at once."""
+    return follower is not None and follower.is_prepared
 
 
 def keep(obj, follower):
-    """Keep the `Follower` of an object, and drop unused ones."""
-    used = {binding_key(other) for other in bound_objects()}
+    """Keep the follower of an object, and drop unused ones."""
+    used = {kind_of(other).key(other) for other in bound_objects()}
     for key in _followers.keys() - used:
         del _followers[key]
-    _followers[binding_key(obj)] = follower
+    _followers[kind_of(obj).key(obj)] = follower
 
 
 def plan_follower(obj):
-    """Read a bound object; return a function of a progress callback that returns its `Follower`, kept or new."""
+    """Read a bound object; return a function of a progress callback that returns its follower, kept or new."""
     known = find(obj)
-    return partial(Follower, read_binding(obj)) if known is None else lambda progress: known
+    return kind_of(obj).plan_follower(obj) if known is None else lambda progress: known
 
 
 def plan_settled(obj, pose, waits=True):
-    """Read a bound object; return a function of a progress callback that returns its `Follower` and the deformation.
+    """Read a bound object; return a function of a progress callback that returns its follower and the deformation.
 
-    Unless it `waits`, a new `Follower` gives a quick result first.
+    Unless it `waits`, a new follower gives a quick result first.
     """
     make, discs, at_once = plan_follower(obj), discs_at_rest(obj), waits or find(obj) is not None
 
@@ -156,20 +155,21 @@ def write(obj, follower, moved, pose):
 
 
 def update(obj, depsgraph=None, wanted=State.SETTLED):
-    """Let a bound object follow its handles, if they have moved and the binding holds.
+    """Let a bound object follow, if what it follows has moved and the binding holds.
 
     Parameters
     ----------
     obj : bpy.types.Object
     depsgraph : bpy.types.Depsgraph, optional
-        Where the handles are read; otherwise as the viewport shows them.
+        Where that is read; otherwise as the viewport shows them.
     wanted : State
         SETTLED at any cost; PREPARING to leave missing factors to the timer; QUICK for one step only, with the rest
         left to the timer.
     """
     if stale_reason(obj, glance=wanted is not State.SETTLED, trusting=wanted is State.QUICK):
         return
-    pose = read_pose(obj, depsgraph)
+    kind = kind_of(obj)
+    pose = kind.read_pose(obj, depsgraph)
     shown, follower = shown_state(obj, pose), _followers.get(pose.key)
     if shown is State.SETTLED:
         _followed[obj.session_uid].trouble = ""  # of another pose
@@ -178,6 +178,9 @@ def update(obj, depsgraph=None, wanted=State.SETTLED):
         keep(obj, follower)
         write(obj, follower, moved, pose)
     elif State.PREPARING in (shown, wanted):
+        if follower is None and kind.at_once:
+            follower = kind.plan_follower(obj)(lambda stage, fraction: None)
+            keep(obj, follower)
         if follower is not None:
             start = follower.last.get(obj.session_uid)
             write(obj, follower, follower.move(pose, discs_at_rest(obj), State.QUICK, start), pose)
@@ -246,7 +249,7 @@ def _attend(obj, depsgraph) -> bool:
         if stale_reason(obj, glance=True):
             _drop(followed)
             return False
-        pose = read_pose(obj, depsgraph)
+        pose = kind_of(obj).read_pose(obj, depsgraph)
         if thread is None:
             return _start(obj, pose)
         if thread.work.ended:

@@ -1,9 +1,8 @@
-"""Poses of the handles of bound objects, and the displacements for them.
+"""Poses of what bound objects follow, and the displacements for them.
 
 Displacements are the attribute `lb_displacement`, in local space.
 """
 
-import zlib
 from dataclasses import dataclass
 from enum import Enum
 
@@ -13,16 +12,17 @@ import numpy as np
 
 from ...command.quantities import DISPLACEMENT
 from ...core import PointCloudError
-from ..objects.attributes import in_edit_mesh, point_count, positions_now, tag_changed, write_attribute
-from ..objects.carried import carries, write_moved
+from ..objects.attributes import in_edit_mesh, point_count, tag_changed, write_attribute
+from ..objects.carried import write_moved
+from .kinds import kind_of
 
 POSE = "lb_pose"  # custom property of the mesh: the pose of the displacements
 
 
 class State(Enum):
-    """How far a bound object follows its handles."""
+    """How far a bound object follows its handles or bones."""
 
-    BAKED = "baked"  # it shows a baked animation, which no handle changes
+    BAKED = "baked"  # it shows a baked animation, which nothing changes
     STALE = "stale"  # something has changed since it was bound
     PREPARING = "preparing"  # handles were moved, and factors are missing
     QUICK = "quick"  # one step of the coarse solver from the last result
@@ -31,26 +31,17 @@ class State(Enum):
 
 @dataclass(frozen=True)
 class Pose:
-    """A pose of the handles, with everything else that displacements depend on while the binding is valid.
+    """What displacements depend on while the binding is valid.
 
     Attributes
     ----------
     key : tuple
-        The `binding_key` of the object.
-    changes : dict of str to ndarray, (4, 4)
-        Transforms of groups by their empties since they were bound, in local space.
-    edited : ndarray, (n, 3), or None
-        Positions in local space, where some handles are moved in Edit Mode.
-    steps : int
-        Maximum number of a settled result.
+        What the follower of the object depends on, see `Kind.key`.
     numbers : ndarray
-        Its identity, kept in the file: checksums of the settings and of the edited positions, and all transforms.
+        Its identity, kept in the file: two checksums and all transforms.
     """
 
     key: tuple
-    changes: dict
-    edited: np.ndarray | None
-    steps: int
     numbers: np.ndarray
 
     def is_same(self, numbers) -> bool:
@@ -63,41 +54,16 @@ class Pose:
         )
 
 
-def read_pose(obj, depsgraph=None) -> Pose:
-    """Read the pose of an object, evaluated by a depsgraph or else as in the viewport."""
-    settings = obj.meshfree.deform
-    moved_by = [item for item in settings.handle_items if item.has_empty and is_there(item.empty)]
-    changes = {item.name: _empty_change(obj, item, depsgraph) for item in moved_by}
-    edited = positions_now(obj) if any(not item.has_empty for item in settings.handle_items) else None
-    key = binding_key(obj)
-    asked = (key[1], settings.steps, *(["carried"] if carries(obj) else []))
-    checksums = [zlib.crc32(repr(asked).encode()), 0 if edited is None else zlib.crc32(edited)]
-    numbers = np.concatenate([checksums, *(change.ravel() for change in changes.values())])
-    return Pose(key, changes, edited, settings.steps, numbers)
-
-
-def binding_key(obj) -> tuple:
-    """Return what the factors of an object depend on: its binding, which copies share, and settings."""
-    settings = obj.meshfree.deform
-    return settings.binding_id, (settings.rotation_aware, settings.soft, settings.weight if settings.soft else 0.0)
-
-
-def _empty_change(obj, item, depsgraph):
-    """Return the transform of handles by their empty since they were bound, in local space, (4, 4)."""
-    rest = np.reshape(item.rest, (4, 4)).astype(np.float64)
-    return relative_matrix(obj, item.empty, depsgraph) @ np.linalg.inv(rest)
-
-
-def relative_matrix(obj, empty, depsgraph=None):
-    """Return the matrix of an empty in the space of an object, (4, 4) float64, evaluated by a depsgraph."""
+def relative_matrix(obj, other, depsgraph=None):
+    """Return the matrix of another object in the space of an object, (4, 4) float64, evaluated by a depsgraph."""
     if depsgraph is not None:
-        obj, empty = obj.evaluated_get(depsgraph), empty.evaluated_get(depsgraph)
+        obj, other = obj.evaluated_get(depsgraph), other.evaluated_get(depsgraph)
     matrix = np.array(obj.matrix_world, dtype=np.float64)
     if not np.linalg.cond(matrix[:3, :3]) < 1e6:
         raise PointCloudError(
             f'"{obj.name}" is scaled to nothing along an axis. Give it a scale above zero along each axis.'
         )
-    return np.linalg.inv(matrix) @ np.array(empty.matrix_world, dtype=np.float64)
+    return np.linalg.inv(matrix) @ np.array(other.matrix_world, dtype=np.float64)
 
 
 def is_there(obj, scene=None) -> bool:
@@ -140,4 +106,6 @@ def write_displacement(obj, displacement, numbers, state, moved):
 
 def write_rest(obj):
     """Write zero displacements for the present pose."""
-    write_displacement(obj, np.zeros((point_count(obj.data), 3)), read_pose(obj).numbers, State.SETTLED, {})
+    write_displacement(
+        obj, np.zeros((point_count(obj.data), 3)), kind_of(obj).read_pose(obj).numbers, State.SETTLED, {}
+    )

@@ -5,16 +5,14 @@ from dataclasses import replace
 import bpy
 import numpy as np
 from bpy.props import BoolProperty
-from mathutils import Matrix, Vector
+from mathutils import Vector
 
 from ... import core
 from ...core import PointCloudError
 from ..objects.all_or_nothing import all_or_nothing
-from ..objects.animation import moves_by_keys, stop_moving
 from ..objects.attributes import (
     DISC,
     REST,
-    own_positions,
     point_count,
     read_attribute,
     write_attribute,
@@ -35,24 +33,13 @@ from ..running.job import busy
 from ..running.ready import ReadyOperator, reporting
 from ..tools.select import SelectionOperator, groups_changed, selected
 from . import live
-from .binding import (
-    WRITES,
-    bound_objects,
-    constrain,
-    copied_from,
-    edited_rows,
-    forget,
-    handled_object,
-    is_bound,
-    plan_binding,
-    read_constraints,
-    record,
-    renew,
-    stale_reason,
-)
+from .binding import WRITES, forget, is_bound, stale_reason
 from .follower import Follower
+from .handle_kind import Handles, keyed_empties, record, renew
+from .handles import constrain, copied_from, edited_rows, handled_object, plan_binding, read_constraints
+from .kinds import kind_of
 from .nodes import add_deform, add_shape, find_deform, is_baked, show_live, stored_name
-from .pose import POSE, State, is_there, read_pose, relative_matrix, write_displacement, write_rest
+from .pose import POSE, State, is_there, relative_matrix, write_displacement
 
 
 class MESHFREE_OT_handle_add(SelectionOperator, bpy.types.Operator):
@@ -110,6 +97,9 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
 
     def plan(self, context, obj):
         settings = obj.meshfree.deform
+        if is_bound(obj) and settings.kind != Handles.name:
+            followed = kind_of(obj).followed
+            raise PointCloudError(f'"{obj.name}" follows the {followed} of an armature. Apply or unbind it first.')
         if self.at_once and settings.handles and not handle_names(obj):
             return _plan_ends(context, obj)
         constraints = read_constraints(obj)
@@ -159,7 +149,7 @@ class MESHFREE_OT_deform_bind(HandledOperator, ApplicationOperator, bpy.types.Op
         moved, stay = len(constraints.moved), len(constraints.kept)
         press = "Press G or R to move" if self.at_once else "Move"
         advice = f'{press} "{empties[0][0].name}"' if empties[0] else "Move the handles in Edit Mode"
-        return [*follower.quick.notices, f"{obj.name}: {moved:,} handles and {stay:,} anchors are bound. {advice}"]
+        return [*follower.notices, f"{obj.name}: {moved:,} handles and {stay:,} anchors are bound. {advice}"]
 
     def conclude(self, context, objects):
         item = objects[0].meshfree.deform.handle_items[0]
@@ -256,8 +246,7 @@ class BoundOperator(HandledOperator):
             check_fresh(obj)
             context.view_layer.update()
             live.update(obj)  # settles a quick result
-        empties = [item.empty for item in obj.meshfree.deform.handle_items if is_there(item.empty)]
-        with all_or_nothing([obj, *empties]):
+        with all_or_nothing([obj, *kind_of(obj).written(obj)]):
             line = self.change(context, obj)
         self.report({"INFO"}, line)
         return {"FINISHED"}
@@ -269,7 +258,7 @@ def not_bound(obj) -> str:
 
 
 def check_fresh(obj):
-    """Refuse an object that no longer follows its handles."""
+    """Refuse a bound object that no longer follows."""
     reason = stale_reason(obj)
     if reason:
         raise PointCloudError(f'"{obj.name}" is not up to date. {reason}.')
@@ -289,7 +278,7 @@ class MESHFREE_OT_deform_update(HandledOperator, ApplicationOperator, bpy.types.
 
     def plan(self, context, obj):
         check_fresh(obj)
-        pose = read_pose(obj)
+        pose = kind_of(obj).read_pose(obj)
         compute = live.plan_settled(obj, pose)
         return lambda progress: (pose, *compute(progress))
 
@@ -297,7 +286,7 @@ class MESHFREE_OT_deform_update(HandledOperator, ApplicationOperator, bpy.types.
         pose, follower, moved = result
         live.keep(obj, follower)
         live.write(obj, follower, moved, pose)
-        distance = np.linalg.norm(moved.points - follower.quick.points, axis=1)
+        distance = np.linalg.norm(moved.displacement @ np.reshape(obj.meshfree.deform.matrix, (3, 3)).T, axis=1)
         notices = [] if moved.converged else ["The rotations had not converged. Raise Steps."]
         return [*notices, f"{obj.name}: moved at most by {length_text(distance.max())}"]
 
@@ -314,6 +303,11 @@ class MESHFREE_OT_deform_apply(BoundOperator, bpy.types.Operator):
         default=False,
     )
 
+    @classmethod
+    def obstacle(cls, context):
+        reason = super().obstacle(context)
+        return reason or kind_of(cls.subject(context)).held(cls.subject(context))
+
     def invoke(self, context, event):
         """Ask, where keyframes would be lost."""
         if bpy.app.background or not keyed_empties(self.subject(context)):
@@ -322,41 +316,15 @@ class MESHFREE_OT_deform_apply(BoundOperator, bpy.types.Operator):
 
     def change(self, context, obj):
         check_movable(obj, "IN_PLACE")
-        keyed = keyed_empties(obj)
-        settings, constraints = obj.meshfree.deform, read_constraints(obj)
+        take = kind_of(obj).plan_rest(context, obj, self)
         positions = (read_attribute(obj.data, REST) + shown_displacement(obj)).astype(np.float32)
-        empties = [
-            (item.empty, relative_matrix(obj, item.empty)) if item.has_empty else None for item in settings.handle_items
-        ]
         if has_splats(obj.data):
             write_splats(obj.data, shown_splats(obj))
         else:
             write_own_positions(obj.data, positions)
             for values in shown_moved(obj, get_input(find_deform(obj), "Strength")).values():
                 write_attribute(obj.data, DISC, values)
-        record(obj, positions, np.reshape(settings.matrix, (3, 3)), constraints, empties)
-        write_rest(obj)
-        if keyed and not self.keep_keyframes:
-            for empty in keyed:
-                stop_moving(empty)
-            self.warn(_lost_keyframes(context.scene, keyed), obj)
-        return f"{obj.name}: {len(positions):,} points are at rest where they are now"
-
-
-def keyed_empties(obj) -> list:
-    """Return the empties with keyframed transforms that move this object alone: applying removes these keyframes."""
-    items = [item for item in obj.meshfree.deform.handle_items if item.has_empty and is_there(item.empty)]
-    others = [other for other in bound_objects() if other != obj]
-    shared = {item.empty for other in others for item in other.meshfree.deform.handle_items}
-    return [item.empty for item in items if item.empty not in shared and moves_by_keys(item.empty)]
-
-
-def _lost_keyframes(scene, empties):
-    names = ", ".join(f'"{empty.name}"' for empty in empties)
-    return (
-        f"The keyframes that moved {names} were removed: the shape of frame {scene.frame_current} is at rest now, and"
-        " they would deform it again. Undo, and turn on Keep Keyframes, to keep them."
-    )
+        return take(positions)
 
 
 class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
@@ -364,6 +332,11 @@ class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.deform_to_shape_key"
     bl_label = "To Shape Key"
+
+    @classmethod
+    def obstacle(cls, context):
+        reason = super().obstacle(context)
+        return reason or kind_of(cls.subject(context)).held(cls.subject(context))
 
     def change(self, context, obj):
         if obj.type != "MESH" or has_splats(obj.data):  # shape keys hold positions only
@@ -376,7 +349,7 @@ class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
                 " Turn on Add Empties and bind again."
             )
         key = add_key(obj, "Deform", shown_displacement(obj))
-        put_back(context, obj)
+        kind_of(obj).put_back(context, obj)
         known = live.find(obj)
         renew(obj, constraints)
         if known is not None:
@@ -391,7 +364,7 @@ class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
         write_attribute(data, name, shown_displacement(obj), "FLOAT_VECTOR")
         for item in kept:
             write_attribute(data, stored_name(name, item.name), moved[item.moved], item.data_type)
-        put_back(context, obj)
+        kind_of(obj).put_back(context, obj)
         add_shape(obj, name, kept)
         return f'{obj.name}: the deformation is the modifier "{name}", shown by its Value'
 
@@ -410,8 +383,13 @@ class MESHFREE_OT_deform_reset(BoundOperator, bpy.types.Operator):
     bl_label = "Reset"
     works_stale = True
 
+    @classmethod
+    def obstacle(cls, context):
+        reason = super().obstacle(context)
+        return reason or kind_of(cls.subject(context)).kept(cls.subject(context))
+
     def change(self, context, obj):
-        put_back(context, obj)
+        kind_of(obj).put_back(context, obj)
         return f"{obj.name}: handles and points are at rest"
 
 
@@ -430,7 +408,7 @@ class MESHFREE_OT_deform_unbind(BoundOperator, bpy.types.Operator):
         others = [other for other in bpy.data.objects if other != obj]  # including copies, which may be bound again
         used = {item.empty for other in others for item in other.meshfree.deform.handle_items}
         empties = [item.empty for item in obj.meshfree.deform.handle_items if is_there(item.empty)]
-        put_back(context, obj)
+        kind_of(obj).put_back(context, obj)
         if is_baked(obj):
             delete_bake(obj)
         forget(obj)
@@ -444,29 +422,6 @@ class MESHFREE_OT_deform_unbind(BoundOperator, bpy.types.Operator):
 def shown_displacement(obj):
     """Read the displacements in local space as the modifier shows them, (n, 3)."""
     return read_attribute(obj.data, WRITES[0]) * get_input(find_deform(obj), "Strength")
-
-
-def put_back(context, obj):
-    """Reset handles and points of a bound object to rest, points only if their number is unchanged.
-
-    Handles of the original of a copy are not moved.
-    """
-    settings = obj.meshfree.deform
-    own = copied_from(obj) is None
-    for item in settings.handle_items:
-        if own and item.has_empty and is_there(item.empty):
-            item.empty.matrix_world = obj.matrix_world @ Matrix(np.reshape(item.rest, (4, 4)).tolist())
-    data = obj.data
-    same = settings.point_count == point_count(data) and all(name in data.attributes for name in WRITES)
-    if same and any(not item.has_empty for item in settings.handle_items):
-        constraints = read_constraints(obj)
-        rows = constraints.moved[edited_rows(obj, constraints)]
-        positions = own_positions(data)
-        positions[rows] = read_attribute(data, REST)[rows]
-        write_own_positions(obj.data, positions)
-    context.view_layer.update()
-    if same:
-        write_rest(obj)
 
 
 def delete_bake(obj):

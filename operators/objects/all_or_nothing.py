@@ -7,6 +7,7 @@ import bpy
 from .modifiers import inputs_of, is_own, put_inputs
 
 _OF_PARENT = "parent", "parent_type", "parent_bone"  # in the order in which they can be set
+_FLAGS = "show_viewport", "show_render", "show_in_editmode", "show_on_cage", "show_expanded"  # of modifiers
 
 
 @contextmanager
@@ -16,7 +17,7 @@ def all_or_nothing(objects):
     Their data are copied before, which is cheap: Blender copies the values of points only on write. So are the actions
     of shape keys, and the materials of our own modifiers. After a failure the copies replace them. Objects, materials,
     modifiers and so on that were added since are removed, and objects are visible, selected and active as before;
-    removed modifiers are not restored.
+    of removed modifiers only our own are restored.
     """
     render, layer = bpy.context.scene.render, bpy.context.view_layer
     locked, active = render.use_lock_interface, getattr(layer.objects.active, "name", "")
@@ -66,6 +67,7 @@ class _State:
         self._inverse = obj.matrix_parent_inverse.copy()
         self._modifiers = {item.name: inputs_of(item) if is_own(item) else {} for item in obj.modifiers}
         self._groups = {item.name: item.node_group for item in obj.modifiers if is_own(item)}
+        self._flags = {name: {flag: getattr(obj.modifiers[name], flag) for flag in _FLAGS} for name in self._groups}
         self._own = {name: _plain(obj[name]) for name in _own_names(obj)}
         self._settings = _values(obj.meshfree)
         self._key = obj.active_shape_key_index
@@ -84,6 +86,11 @@ class _State:
             obj.matrix_basis = self._place
         for item in [item for item in obj.modifiers if item.name not in self._modifiers]:
             obj.modifiers.remove(item)
+        for name in self._groups.keys() - {item.name for item in obj.modifiers}:
+            again = obj.modifiers.new(name, "NODES")
+            again.node_group = self._groups[name]
+            for flag, value in self._flags[name].items():
+                setattr(again, flag, value)
         for _ in range(2):  # again, for update functions of some may change others
             _put_values(obj.meshfree, self._settings)  # before inputs, which follow settings
         there = [name for name in self._modifiers if name in obj.modifiers]

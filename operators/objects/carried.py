@@ -65,9 +65,8 @@ def discs_at_rest(obj):
 
 def local_gradients(gradients, matrix):
     """Transform deformation gradients, (n, 3, 3), to local space, from which a matrix, (3, 3), leads."""
-    # Two large products: n small ones take five times as long.
-    right = (gradients.reshape(-1, 3) @ matrix).reshape(-1, 3, 3)
-    return np.moveaxis(np.tensordot(np.linalg.inv(matrix), right, (1, 1)), 1, 0)
+    both = np.kron(np.linalg.inv(matrix).T, matrix)  # one large product: n small ones take ten times as long
+    return (gradients.reshape(-1, 9) @ both).reshape(-1, 3, 3)
 
 
 def moved_discs(vectors, gradients):

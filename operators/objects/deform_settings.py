@@ -4,6 +4,7 @@ import bpy
 from bpy.props import (
     BoolProperty,
     CollectionProperty,
+    EnumProperty,
     FloatProperty,
     FloatVectorProperty,
     IntProperty,
@@ -35,8 +36,18 @@ class MESHFREE_PG_handle(bpy.types.PropertyGroup):
     )
 
 
+class MESHFREE_PG_bone(bpy.types.PropertyGroup):
+    """A bone that points follow, as it was when they were bound; its name is that of the bone"""
+
+    rest: FloatVectorProperty(name="Rest Matrix", description="Matrix of the bone at rest in its armature", size=16)
+
+
+def _is_armature(settings, obj):
+    return obj.type == "ARMATURE"
+
+
 class MESHFREE_PG_deform(bpy.types.PropertyGroup):
-    """Deformation of one object by handles"""
+    """Deformation of one object by handles or bones"""
 
     handles: StringProperty(
         name="Handles",
@@ -82,8 +93,30 @@ class MESHFREE_PG_deform(bpy.types.PropertyGroup):
         update=_follow,
     )
 
+    preserve_volume: BoolProperty(
+        name="Preserve Volume",
+        description="Blend the motions of bones as screws, by dual quaternions, so that bent and twisted limbs keep"
+        " their volume",
+        default=False,
+        update=_follow,
+    )
+
     # What the object is bound with.
-    is_bound: BoolProperty(name="Bound", description="The object follows its handles", update=_find_bound)
+    is_bound: BoolProperty(name="Bound", description="The object follows handles or bones", update=_find_bound)
+    kind: EnumProperty(
+        name="Kind",
+        description="What the points follow",
+        items=[("HANDLES", "Handles", "Groups of points"), ("BONES", "Bones", "The bones of an armature")],
+    )
+    armature: PointerProperty(
+        type=bpy.types.Object,
+        name="Armature",
+        description="The armature whose bones the points follow",
+        poll=_is_armature,
+    )
+    bone_items: CollectionProperty(
+        type=MESHFREE_PG_bone, name="Bones", description="The bones that the points follow, at rest"
+    )
     handle_items: CollectionProperty(
         type=MESHFREE_PG_handle, name="Handles", description="How the groups of handles are moved"
     )
@@ -95,4 +128,4 @@ class MESHFREE_PG_deform(bpy.types.PropertyGroup):
     matrix: FloatVectorProperty(name="Matrix", description="Scale and shear when it was bound", size=9)
 
 
-CLASSES = (MESHFREE_PG_handle, MESHFREE_PG_deform)
+CLASSES = (MESHFREE_PG_handle, MESHFREE_PG_bone, MESHFREE_PG_deform)

@@ -10,7 +10,7 @@ from .attributes import SELECTION, write_attribute
 def check_deletable(obj):
     """Refuse an object whose points cannot be deleted, before anything is computed."""
     if obj.meshfree.deform.is_bound:
-        raise PointCloudError(f'"{obj.name}" is bound to handles. Apply or unbind it first.')
+        raise PointCloudError(f'"{obj.name}" is bound. Apply or unbind it first.')
     if obj.type != "MESH" and not obj.visible_get():
         raise PointCloudError(f'"{obj.name}" is hidden. Show it, so that its points can be deleted.')
 

@@ -19,6 +19,7 @@ _OWN = {
     "panels_changed": [],  # () what they show of running work: ui/show.py
     "measuring_changed": [],  # () the plane of volumes: operators/tools/measure_live.py
     "deform_changed": [],  # (obj) by a setting: operators/deform/live.py
+    "weights_changed": [],  # (obj) of bones: operators/rigging/follow.py
     "bound_changed": [],  # () which objects are bound: operators/deform/live.py
 }
 

@@ -5,19 +5,18 @@ from typing import NamedTuple
 import bpy
 import numpy as np
 from bpy.props import BoolProperty, FloatProperty, IntProperty
-from mathutils import Matrix
 
 from ... import core
 from ...core import NotASurfaceError, PointCloudError, TooFewPointsError
+from ..objects.attributes import DISC
 from ..objects.groups import has_group
-from ..objects.modifiers import is_own
 from ..objects.place import moves_with
 from ..objects.reading import TYPES, find_object, obstacle, sharing_objects
-from ..objects.splats import has_splats
 from ..registration import Registration, Row
 from ..running.application import ApplicationOperator, Tool, operator_reader
 from .bones import chosen_armature, deforming_bones, ends_seen_from
-from .weights import MOST, read_weights, weight_names, write_weights
+from .follow import Bones, add_modifier, bind, set_parent
+from .weights import MOST, read_weights, takes_groups, weight_names, write_weights
 
 _BUILDING = 0.6  # share of the time that the operator takes
 _NAMED = 5  # bones that a notice names
@@ -89,7 +88,7 @@ class AutoWeights(Tool):
         reading, operator = operator_reader(context, obj)
         settings = {"falloff": self.falloff, "least": self.least, "visible": self.visible}
         most = self.influences or None
-        settings["influences"] = most if _takes_groups(obj) else min(most or MOST, MOST)
+        settings["influences"] = most if takes_groups(obj) else min(most or MOST, MOST)
 
         def compute(progress):
             def part(first, share):
@@ -120,12 +119,12 @@ class AutoWeights(Tool):
             raise PointCloudError(f'Bones of "{armature.name}" were changed or moved meanwhile. Start it again.')
         locked = _write(obj, result.names, result.weights)
         others = _other_armatures(obj, armature)
-        for user in (obj, *sharing_objects(obj)):
-            _bind(user, armature)
+        told = [notice for user in (obj, *sharing_objects(obj)) for notice in _bind(user, armature)]
         largest = result.weights.max(axis=0)
         without = [name for name, most in zip(result.names, largest, strict=True) if most == 0.0]
         notices = [
             *result.notices,
+            *told,
             *_named(locked, "Locked vertex groups, left as they are, with the others normalized around them"),
             *_named(without, "Bones that no point follows"),
             *_named(others, "Armatures that it follows beside this one, by modifiers"),
@@ -141,6 +140,8 @@ def _check_objects(obj, armature, names):
         raise PointCloudError(
             f'"{armature.name}" moves with "{obj.name}", its parent. Clear the parent of the armature (Alt P).'
         )
+    if obj.meshfree.deform.is_bound and obj.meshfree.deform.kind != Bones.name:
+        raise PointCloudError(f'"{obj.name}" follows handles. Apply or unbind it first.')
     taken = [name for name in names if name in obj.data.attributes and not has_group(obj, name)]
     if taken and obj.type == "MESH":
         raise PointCloudError(
@@ -157,11 +158,6 @@ def _check_objects(obj, armature, names):
 def _have_moved(ends, now):
     """Whether bones lie elsewhere, seen from the points."""
     return np.abs(np.array(now) - ends).max() > _MOVED * np.ptp(ends.reshape(-1, 3), axis=0).max()
-
-
-def _takes_groups(obj):
-    """Whether an object follows bones by vertex groups and Blender's own modifier."""
-    return obj.type == "MESH" and not has_splats(obj.data)
 
 
 def _write(obj, names, weights):
@@ -195,38 +191,13 @@ def _named(names, what):
 
 
 def _bind(obj, armature):
-    """Let an object follow an armature by its weights, as Blender's own Automatic Weights leaves it; it stays there."""
-    if _takes_groups(obj):
-        _add_modifier(obj, armature)
-    _set_parent(obj, armature)
+    """Let an object follow an armature by its weights, as Blender's own Automatic Weights leaves it; return notices.
 
-
-def _add_modifier(obj, armature):
-    """Add an Armature modifier for an armature, before our own ones, unless there is one."""
-    if any(item.type == "ARMATURE" and item.object == armature for item in obj.modifiers):
-        return
-    first = next((index for index, item in enumerate(obj.modifiers) if is_own(item)), len(obj.modifiers))
-    modifier = obj.modifiers.new("Armature", "ARMATURE")
-    modifier.object = armature
-    obj.modifiers.move(len(obj.modifiers) - 1, first)
-
-
-def _set_parent(obj, armature):
-    """Make an armature the parent of an object, which stays where it is, with its own channels as they are."""
-    if obj.parent == armature and obj.parent_type == "OBJECT":
-        return
-    inverse = armature.matrix_world.inverted() @ _from_parent(obj)
-    obj.parent, obj.parent_type = armature, "OBJECT"
-    obj.matrix_parent_inverse = inverse
-
-
-def _from_parent(obj):
-    """Return the transform that an object has from its parent; constraints come after it."""
-    if obj.parent is None:
-        return Matrix()
-    if obj.parent_type == "OBJECT":
-        return obj.parent.matrix_world @ obj.matrix_parent_inverse
-    return obj.matrix_world @ obj.matrix_basis.inverted()
+    It stays where it is. Blender's modifier turns no discs, and moves no splats: they are bound.
+    """
+    add_modifier(obj, armature)
+    set_parent(obj, armature)
+    return [] if takes_groups(obj) and DISC not in obj.data.attributes else bind(obj, armature)
 
 
 class MESHFREE_OT_auto_weights(AutoWeights, ApplicationOperator, bpy.types.Operator):

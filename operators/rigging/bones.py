@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ... import core
 from ...core import PointCloudError
 
 
@@ -50,10 +51,11 @@ def chosen_armature(context):
 
 
 def followed_armature(obj):
-    """Return the armature that an object follows, by its modifiers or as its child; None if there is none."""
+    """Return the armature that an object follows: bound to it, by its modifiers, or as its child; None without one."""
     if obj is None:
         return None
-    found = [item.object for item in obj.modifiers if item.type == "ARMATURE"] + [obj.parent]
+    modifiers = [item.object for item in obj.modifiers if item.type == "ARMATURE"]
+    found = [obj.meshfree.deform.armature, *modifiers, obj.parent]
     return next((other for other in found if other is not None and other.type == "ARMATURE"), None)
 
 
@@ -76,19 +78,55 @@ def ends_seen_from(obj, armature, bones):
     return tuple(ends @ matrix[:3, :3].T + shift for ends in (bones.heads, bones.tails))
 
 
-def pose_matrices(armature, names):
-    """Return how bones have moved since rest, in the armature's space, (b, 4, 4).
+class Envelopes(NamedTuple):
+    """How bones limit weights, as Blender's Armature modifier does.
 
-    Parameters
+    Attributes
     ----------
-    armature : bpy.types.Object
-        Evaluated by a depsgraph where constraints and drivers count.
-    names : sequence of str
-        Those of bones that are gone stay.
+    deforms : ndarray, (b,) bool
+        Whether a bone is followed at all.
+    multiplies : ndarray, (b,) bool
+        Whether weights are multiplied by its envelope.
+    ends : ndarray, (2, b, 3)
+        Heads and tails at rest in the armature's space.
+    sizes : ndarray, (3, b)
+        Radii there, and distances.
     """
-    changes = np.tile(np.eye(4), (len(names), 1, 1))
-    for change, name in zip(changes, names, strict=True):
-        bone = armature.pose.bones.get(name)
+
+    deforms: np.ndarray
+    multiplies: np.ndarray
+    ends: np.ndarray
+    sizes: np.ndarray
+
+    @property
+    def text(self) -> bytes:
+        """What tells envelopes from others."""
+        return b"".join(part.tobytes() for part in self)
+
+    def shares(self, points, bones):
+        """Return by how much the weights of points, (k, 3), of a bone each, (k,) int, are multiplied, (k,)."""
+        return core.envelope_share(points, *self.ends[:, bones], *self.sizes[:, bones])
+
+
+def envelopes(armature, names) -> Envelopes:
+    """Read how bones limit weights; those that are gone do not deform."""
+    bones = [armature.data.bones.get(name) for name in names]
+    deforms, multiplies = np.zeros(len(names), bool), np.zeros(len(names), bool)
+    ends, sizes = np.zeros((2, len(names), 3)), np.zeros((3, len(names)))
+    for number, bone in enumerate(bones):
         if bone is not None:
-            change[:] = np.array(bone.matrix) @ np.linalg.inv(np.array(bone.bone.matrix_local))
-    return changes
+            deforms[number], multiplies[number] = bone.use_deform, bone.use_deform and bone.use_envelope_multiply
+            if multiplies[number]:
+                ends[:, number] = bone.head_local, bone.tail_local
+                sizes[:, number] = bone.head_radius, bone.tail_radius, bone.envelope_distance
+    return Envelopes(deforms, multiplies, ends, sizes)
+
+
+def bone_matrices(bones, names, attribute: str):
+    """Return the matrices of bones, or of bones in a pose, (b, 4, 4); the identity of those that are gone."""
+    matrices = np.tile(np.eye(4), (len(names), 1, 1))
+    for number, name in enumerate(names):
+        bone = bones.get(name)
+        if bone is not None:
+            matrices[number] = getattr(bone, attribute)
+    return matrices

@@ -94,7 +94,7 @@ def _check(obj):
     """Refuse an object that would lose data."""
     check_writable(obj, (), obj.meshfree.make_single_user)
     if obj.meshfree.deform.is_bound:
-        raise PointCloudError(f'"{obj.name}" is bound to handles, which would be lost. Apply or unbind it first.')
+        raise PointCloudError(f'"{obj.name}" is bound, which would be lost. Apply or unbind it first.')
     if not obj.visible_get():
         raise PointCloudError(f'"{obj.name}" is hidden, and Blender converts what is seen. Show it first.')
 

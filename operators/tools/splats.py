@@ -140,7 +140,7 @@ def _check_placeable(obj, matrix):
     """Refuse an object whose splats cannot be moved by a matrix, (4, 4), before anything is computed."""
     check_movable(obj, "IN_PLACE")
     if any(map(is_deform, obj.modifiers)):
-        raise PointCloudError(f'"{obj.name}" is bound to handles. Unbind it first.')
+        raise PointCloudError(f'"{obj.name}" is bound. Unbind it first.')
     if not np.linalg.cond(matrix[:3, :3]) < 1e6:
         raise PointCloudError(
             f'"{obj.name}" is scaled to nothing along an axis. Give it a scale above zero along each axis.'

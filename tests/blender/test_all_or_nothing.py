@@ -14,6 +14,7 @@ from tests.blender.clouds import add_group, add_object, differences, everything,
 from tests.blender.conftest import new_file, part
 from tests.blender.operators import applications
 from tests.blender.splats import add_splats, bar_splats
+from tests.blender.test_follow import add_arm, pose
 
 SKIPPED = inspect.CO_GENERATOR, "all_or_nothing.py"  # what Python ends by itself, and what puts things back
 TRIED = set()  # places where an operator has failed
@@ -219,9 +220,28 @@ def boned():
     return obj
 
 
+def weighted():
+    """Splats with weights of the bones of an armature, which is selected, too."""
+    armature = add_arm(5.0, 5.0)
+    obj = add_splats(bar_splats(part("core"), degree=1))
+    weights = np.tile([0.25, 0.75], (len(obj.data.attributes["position"].data), 1))
+    part("operators.rigging.weights").write_weights(obj, ["Bone.0", "Bone.1"], weights)
+    armature.select_set(True)
+    return obj
+
+
+def rigged():
+    """Splats that follow an armature in a pose."""
+    obj = weighted()
+    bpy.ops.meshfree.bind_armature()
+    pose(bpy.data.objects["Arm"], "Bone.1")
+    return obj
+
+
 FIRST = {  # what is there before tools that a sphere with groups is not enough for, and what they have to be told
     "align_points": (compared, {}),
     "auto_weights": (boned, {}),
+    "bind_armature": (weighted, {}),
     "compare": (compared, {}),
     "compare_swap": (compared_before, {}),
     "deform_update": (bound, {}),
@@ -252,6 +272,8 @@ VARIANTS = [
     (unhandled, "deform_bind", {"at_once": True}),
     (film, "minimal_surface", {"target": "IN_PLACE"}),
     (film, "minimal_surface", {}),
+    (weighted, "bind_armature", {}),
+    (rigged, "bind_armature", {}),
 ]
 
 
@@ -357,6 +379,11 @@ def two_of_splats():
     for obj in bpy.data.objects:
         obj.select_set(True)
     bpy.context.view_layer.update()
+
+
+@pytest.mark.parametrize("name", ["deform_apply", "deform_to_shape_key", "deform_unbind"])
+def test_what_follows_an_armature_stays_so_if_taking_it_over_fails(extension, name):
+    assert fail_everywhere(extension, rigged, name, every=3) > 2
 
 
 def test_splats_stay_if_joining_fails(extension):

@@ -185,7 +185,7 @@ def test_the_modifier_comes_before_our_own():
     bpy.ops.meshfree.show_surface()
     choose(armature, obj)
     bpy.ops.meshfree.auto_weights()
-    assert [item.type for item in obj.modifiers] == ["ARMATURE", "NODES"]
+    assert [item.type for item in obj.modifiers] == ["ARMATURE", "NODES", "NODES"]
 
 
 def test_the_armature_is_chosen_by_selection_or_by_what_the_object_follows():
@@ -301,6 +301,12 @@ def test_a_point_cloud_has_the_weights_of_the_same_vertices():
     bpy.ops.meshfree.auto_weights()
     assert_allclose(part("operators.rigging.weights").read_weights(cloud), expected, atol=1e-5)
     assert cloud.parent == armature
+    armature.pose.bones["upper"].scale = (1.0, 2.0, 1.0)  # along the bone
+    bpy.context.view_layer.update()
+    rest = np.array([point.co for point in cloud.data.points])
+    data = cloud.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    moved = np.array([value.vector for value in data.attributes["position"].data])
+    assert_allclose(moved - rest, expected[:, [1]] * rest * [0.0, 0.0, 1.0], atol=1e-5)
 
 
 def test_a_failure_in_the_middle_leaves_everything(monkeypatch):
@@ -315,9 +321,10 @@ def test_a_failure_in_the_middle_leaves_everything(monkeypatch):
     bind = automatic._bind
 
     def fail(obj, armature):
-        bind(obj, armature)
+        notices = bind(obj, armature)
         if obj == objects[1]:
             raise MemoryError("injected")
+        return notices
 
     monkeypatch.setattr(automatic, "_bind", fail)
     with pytest.raises(RuntimeError, match="The memory is used up"):

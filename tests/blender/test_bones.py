@@ -42,7 +42,9 @@ def test_a_pose_is_how_bones_have_moved():
     armature = two_bones()
     armature.pose.bones["Bone.1"].location = (0, 0.5, 0)  # along the bone
     bpy.context.view_layer.update()
-    found = part("operators.rigging.bones").pose_matrices(armature, ["Bone.0", "Bone.1", "Gone"])
+    bones, names = part("operators.rigging.bones"), ["Bone.0", "Bone.1", "Gone"]
+    posed = bones.bone_matrices(armature.pose.bones, names, "matrix")
+    found = posed @ np.linalg.inv(bones.bone_matrices(armature.data.bones, names, "matrix_local"))
     assert np.allclose(found[[0, 2]], np.eye(4))
     assert np.allclose(found[1, :3, :3], np.eye(3))
     assert np.allclose(found[1, :3, 3], (0, 0, 0.5))

@@ -17,7 +17,18 @@ from numpy.linalg import LinAlgError
 from tests.blender.clouds import add_group, add_object, differences, everything, sphere_points
 from tests.blender.conftest import part
 from tests.blender.splats import add_splats, bar_splats
-from tests.blender.test_all_or_nothing import bound, by_default, colored, film, handled, keyed, scene, shared, unhandled
+from tests.blender.test_all_or_nothing import (
+    bound,
+    by_default,
+    colored,
+    film,
+    handled,
+    keyed,
+    rigged,
+    scene,
+    shared,
+    unhandled,
+)
 
 COUNT = int(os.environ.get("MESHFREE_FAULTS", "25"))
 FIRST = int(os.environ.get("MESHFREE_FIRST", "0"))
@@ -90,6 +101,9 @@ RUNS = [  # beside all tools by default
     (bound_splats, "deform_update", {}),
     (bound_splats, "deform_bake", {"first": 1, "last": 3}),
     (splats, "minimal_surface", {"steps": 2}),
+    (rigged, "bind_armature", {}),
+    (rigged, "deform_update", {}),
+    (rigged, "deform_bake", {"first": 1, "last": 3}),
 ]
 
 

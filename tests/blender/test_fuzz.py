@@ -17,6 +17,8 @@ from tests.blender.armatures import add_armature, choose
 from tests.blender.clouds import add_group, add_object, everything, grid_points, sphere_points
 from tests.blender.conftest import part
 from tests.blender.splats import add_splats, bar_splats
+from tests.blender.test_follow import add_arm, pose
+from tests.blender.test_follow import bound as bound_to
 
 CASES = int(os.environ.get("MESHFREE_CASES", "150"))
 FIRST = int(os.environ.get("MESHFREE_FIRST", "0"))  # seed
@@ -269,6 +271,22 @@ def of_splats(*names):
     return made
 
 
+def following():
+    """Splats that follow an armature in a pose."""
+    armature = add_arm(5.0, 5.0)
+    obj = add_splats(bar_splats(part("core"), degree=1))
+    bound_to(obj, armature, np.tile([0.25, 0.75], (len(obj.data.attributes["position"].data), 1)))
+    pose(armature, "Bone.1")
+    return obj
+
+
+def weights_without_bones():
+    """Splats that followed an armature, which is deleted."""
+    obj = following()
+    bpy.data.objects.remove(bpy.data.objects["Arm"])
+    return obj
+
+
 OBJECTS = {
     "sphere": sphere,
     "beside others": beside_others,
@@ -304,6 +322,8 @@ OBJECTS = {
     "around an armature": with_armature(changed(with_keys), active=False),
     "splats in an armature": with_armature(of_splats("Splats")),
     "few points in an armature": with_armature(odd_points(lambda points: points[:7])),
+    "following bones": following,
+    "weights without bones": weights_without_bones,
     "animated": changed(animated),
     "driven": changed(driven),
     "bound": changed(bound),

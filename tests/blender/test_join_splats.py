@@ -117,7 +117,7 @@ class TestJoin:
         select(other)
         assert bpy.ops.meshfree.deform_bind(at_once=True) == {"FINISHED"}
         select(one, other)
-        with pytest.raises(RuntimeError, match='"Second" is bound to handles. Unbind it first'):
+        with pytest.raises(RuntimeError, match='"Second" is bound. Unbind it first'):
             bpy.ops.meshfree.join_splats()
 
     def test_one_object_alone_has_nothing_to_join(self, core):

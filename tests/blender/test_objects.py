@@ -127,7 +127,7 @@ class TestCopiesOfBoundObjects:
     def test_the_handle_leads_to_the_original(self, bound):
         copy = duplicate(bound)
         copy.name = "A"  # before the other in the scene's order, or not
-        assert part("operators.deform.binding").handled_object(empty_of(bound), bpy.context.scene) == bound
+        assert part("operators.deform.handles").handled_object(empty_of(bound), bpy.context.scene) == bound
 
     def test_appended_to_another_file_it_follows(self, bound, tmp_path):
         path = str(tmp_path / "bound.blend")
@@ -505,7 +505,7 @@ class TestConverting:
 
     def test_what_is_refused(self, bound):
         before = everything(bound)
-        with pytest.raises(RuntimeError, match="is bound to handles, which would be lost"):
+        with pytest.raises(RuntimeError, match="is bound, which would be lost"):
             bpy.ops.meshfree.convert(target="POINTCLOUD")
         with pytest.raises(RuntimeError, match='"Cloud" is a mesh already'):
             bpy.ops.meshfree.convert(target="MESH")

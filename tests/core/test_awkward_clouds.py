@@ -452,6 +452,9 @@ def calls():
     yield core.mix_weights, {}, {"before": np.ones((9, 2)), "taken": np.ones((9, 2)), "mix": 0.5, "locked": [0]}
     yield core.are_normalized, {}, {"weights": np.ones((9, 2))}
     yield core.skin, {"gradients": False}, {"points": points, "weights": np.ones((n, 1)), "matrices": np.eye(4)[None]}
+    yield core.Skinner(np.ones((n, 1))).move, {"gradients": False}, {"points": points, "matrices": np.eye(4)[None]}
+    ends = {"heads": points, "tails": 2.0 * points, "head_radii": np.ones(n), "tail_radii": np.ones(n)}
+    yield core.envelope_share, {}, {"points": points, **ends, "distances": np.ones(n)}
     yield core.solve_poisson, on, {"source": points[:, 2], "fixed": [0], "fixed_values": [0.0]}
     yield core.geodesic_distance, on, {"sources": [0]}
     yield core.falloff, {}, {"distance": points[:, 0] ** 2, "radius": 1.0, "shape": "sharp"}

@@ -14,7 +14,7 @@ WITHOUT = {  # functions whose examples are those of what they go with, or which
     *("read_splats", "write_splats"),
 }
 CLASSES = {"CoarseDeformer", "Deformer", "Doubt", "Geodesics", "LaplacianOptions", "Prolongation", "Slopes"}
-CLASSES |= {"Heat", "ReactionDiffusion", "Strays", "SurfaceMeasures", "Transport", "Wave"}
+CLASSES |= {"Heat", "ReactionDiffusion", "Skinner", "Strays", "SurfaceMeasures", "Transport", "Wave"}
 METHODS = {"LaplaceBeltrami.apply", "LaplaceBeltrami.eigenpairs", "LaplaceBeltrami.toward", "paper.build_laplacian"}
 FUNCTIONS = {name for name in core.__all__ if inspect.isfunction(getattr(core, name))}
 SHOWN = sorted(CLASSES | METHODS | FUNCTIONS - WITHOUT)

@@ -48,7 +48,10 @@ class TestSkin:
 
     @pytest.mark.parametrize("dual", [False, True])
     def test_gradients_are_slopes_of_the_motion(self, dual):
-        matrices = [turned((1, 0, 1), 0.8, (1, 0, 0)), turned((0, 1, 0), -0.9), turned((1, 1, 1), 2.0, (0, 0, 3))]
+        matrices = np.array(
+            [turned((1, 0, 1), 0.8, (1, 0, 0)), turned((0, 1, 0), -0.9), turned((1, 1, 1), 2.0, (0, 0, 3))]
+        )
+        matrices[1, :, :3] *= 1.3, 0.8, 1.0
         _, gradients = core.skin(self.points, self.weights, matrices, dual_quaternions=dual, gradients=True)
         for axis in np.eye(3):
             ahead, behind = (
@@ -56,6 +59,54 @@ class TestSkin:
                 for step in (1e-4, -1e-4)
             )
             assert (ahead - behind) / 2e-4 == pytest.approx(gradients @ axis, abs=1e-8)
+
+    @pytest.mark.parametrize("dual", [False, True])
+    def test_it_does_not_matter_where_the_origin_is(self, dual):
+        matrices = np.array([turned((1, 0, 1), 0.8, (1, 0, 0)), turned((0, 1, 0), -0.9), turned((1, 1, 1), 2.0)])
+        matrices[:, :, :3] *= np.array([[1.5], [0.7], [1.0]])[:, None]
+        origin = np.array([5.0, -3.0, 8.0])
+        beside = matrices.copy()
+        beside[:, :, 3] += origin - matrices[:, :, :3] @ origin
+        moved = core.skin(self.points, self.weights, matrices, dual_quaternions=dual)
+        found = core.skin(self.points + origin, self.weights, beside, dual_quaternions=dual)
+        assert found - origin == pytest.approx(moved, abs=1e-12)
+
+    def test_a_stretch_that_all_bones_share_stretches_all(self):
+        stretch = np.column_stack([np.diag([2.0, 1.0, 0.5]), np.zeros(3)])
+        moved = core.skin(self.points, self.weights, [stretch] * 3, dual_quaternions=True)
+        assert moved == pytest.approx(self.points * (2.0, 1.0, 0.5), abs=1e-12)
+
+    @pytest.mark.parametrize("dual", [False, True])
+    def test_what_is_prepared_moves_points_again_as_the_first_time(self, dual):
+        poses = [
+            [turned((1, 0, 1), angle, (1, 0, 0)), turned((0, 1, 0), -angle), turned((1, 1, 1), 2.0 * angle)]
+            for angle in (0.3, 3.0, 0.3)
+        ]
+        skinner = core.Skinner(self.weights)
+        found = [skinner.move(self.points, pose, dual_quaternions=dual) for pose in poses]
+        expected = [core.skin(self.points, self.weights, pose, dual_quaternions=dual) for pose in poses]
+        assert np.array_equal(found, expected)
+        with pytest.raises(core.InvalidPointsError, match="matrices of 2"):
+            skinner.move(self.points, poses[0][:2])
+
+    def test_stretches_by_rounding_are_left_out_only_where_asked_for(self):
+        matrices = np.array([turned((1, 0, 1), 0.8), turned((0, 1, 0), -0.9), turned((1, 1, 1), 2.0)])
+        skinner = core.Skinner(np.eye(3)[np.arange(200) % 3])
+        rigid = skinner.move(self.points, matrices, dual_quaternions=True)
+        matrices[:, :, :3] *= 1.0 + 1e-6
+        found = skinner.move(self.points, matrices, dual_quaternions=True)
+        assert found == pytest.approx((1.0 + 1e-6) * rigid, abs=1e-12)
+        assert skinner.move(self.points, matrices, dual_quaternions=True, rounding=2e-6) == pytest.approx(
+            rigid, abs=1e-12
+        )
+
+    def test_named_bones_are_the_columns_of_a_table(self):
+        matrices = [turned((1, 0, 1), 0.8), turned((0, 1, 0), -0.9), turned((1, 1, 1), 2.0)]
+        order = np.argsort(self.weights, axis=1)
+        named = core.Skinner(np.take_along_axis(self.weights, order, axis=1), order)
+        assert named.move(self.points, matrices) == pytest.approx(core.skin(self.points, self.weights, matrices))
+        with pytest.raises(core.InvalidPointsError, match="There are 2 bones"):
+            core.Skinner(self.weights, order, 2)
 
     def test_a_bent_bar_keeps_its_volume_by_screws(self):
         """A quarter of a turn about y: linear blending halves the cross section in the bend, screws do not."""
@@ -90,6 +141,27 @@ class TestSkin:
     def test_bad_input_is_refused(self, weights, matrices, text):
         with pytest.raises(core.InvalidPointsError, match=text):
             core.skin(self.points, weights, matrices)
+
+
+class TestEnvelopes:
+    def test_a_cone_with_round_ends(self):
+        points = np.array([[0, 0, -1.2], [0, 0, 2.7], [1.4, 0, 1.0], [1.9, 0, 1.0], [2.1, 0, 1.0], [2.6, 0, 1.0]])
+        radii = np.ones(6), np.full(6, 2.0)
+        heads, tails = np.zeros((6, 3)), np.tile([0.0, 0.0, 2.0], (6, 1))
+        found = core.envelope_share(points, heads, tails, *radii, np.ones(6))
+        assert found == pytest.approx([1 - 0.2**2, 1, 1, 1 - 0.4**2, 1 - 0.6**2, 0])
+
+    def test_without_a_distance_it_ends_at_once_and_a_bone_without_length_is_a_ball(self):
+        points, origin = np.array([[0.9, 0, 0], [1.1, 0, 0]]), np.zeros((2, 3))
+        found = core.envelope_share(points, origin, origin, np.ones(2), np.ones(2), np.zeros(2))
+        assert found.tolist() == [1.0, 0.0]
+
+    def test_bad_input_is_refused(self):
+        ends, ones = np.zeros((2, 3)), np.ones(2)
+        with pytest.raises(core.InvalidPointsError, match="Radii"):
+            core.envelope_share(ends, ends, ends, ones[:1], ones, ones)
+        with pytest.raises(core.InvalidPointsError, match="not finite|NaN|finite"):
+            core.envelope_share(ends, ends, ends, ones, ones * np.nan, ones)
 
 
 def volume(points, around):

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from ...algebra import nearest_rotations
-from ...arguments import as_doubles, check_array, check_finite, check_positions, check_switches
+from ...algebra import blocks, nearest_rotations, on_all_cores
+from ...arguments import as_doubles, check_array, check_finite, check_positions, check_switches, not_negative
 from ...errors import InvalidPointsError
-from ...types import Floats, Ints
+from ...types import Bools, Floats, Ints
+
+_BLOCK = 1 << 13  # points worked on at one time, which stay in the cache of the processor
+_STRETCHED = 1e-12  # share of a stretch that is no error of rounding
 
 
 def skin(
@@ -73,28 +77,198 @@ def skin(
     >>> print((moved - points)[[0, 799], 2])
     [5. 0.]
     """
-    check_switches(dual_quaternions=dual_quaternions, gradients=gradients)
+    count = len(check_array(points, "Points", [(None, 3)], "Give x, y, z for each point."))
+    places = check_positions(points, count, "points", "point")
+    given = _check_matrices(matrices)
+    skinner = Skinner(_check_table(weights, (count, len(given))))
+    return skinner.move(places, given, dual_quaternions=dual_quaternions, gradients=gradients)
+
+
+class Skinner:
+    """Weights of bones, prepared to move the same points in many poses.
+
+    Parameters
+    ----------
+    weights : array_like or sparse array, (n, b), or array_like, (n, k)
+        As of `skin`, or of those bones of each point that are named.
+    bones : array_like of int, (n, k), optional
+        Of which bone each weight is.
+    count : int, optional
+        How many bones there are, if they are named; by default so many that all names fit.
+
+    Raises
+    ------
+    InvalidPointsError
+        Weights that are no table, or not finite, or of bones that there are not.
+
+    See Also
+    --------
+    skin : The same for one pose.
+
+    Examples
+    --------
+    The unit sphere, moved twice:
+
+    >>> import numpy as np
+    >>> import core
+    >>> points = core.example_sphere()
+    >>> skinner = core.Skinner(np.ones((len(points), 1)))
+    >>> for shift in (1, 2):
+    ...     moved = skinner.move(points, [np.column_stack([np.eye(3), [0, 0, shift]])])
+    ...     print((moved - points)[0])
+    [0. 0. 1.]
+    [0. 0. 2.]
+    """
+
+    def __init__(self, weights: Any, bones: ArrayLike | None = None, count: int | None = None) -> None:
+        table = _check_table(weights, (None, None)) if bones is None else _named_table(weights, bones, count)
+        self._shape = table.shape
+        self._blocks = [_Block(rows, table[rows]) for rows in blocks(table.shape[0], _BLOCK)]
+
+    def move(
+        self,
+        points: ArrayLike,
+        matrices: ArrayLike,
+        *,
+        dual_quaternions: bool = False,
+        gradients: bool = False,
+        rounding: float = 0.0,
+    ) -> Any:
+        """Move points with the bones; see `skin`.
+
+        Parameters
+        ----------
+        points : array_like, (n, 3)
+        matrices : array_like, (b, 4, 4) or (b, 3, 4)
+        dual_quaternions, gradients : bool
+        rounding : float
+            What in matrices counts as an error of rounding: dual quaternions leave out stretches by such shares, which
+            is faster.
+
+        Returns
+        -------
+        moved : ndarray, (n, 3)
+        gradients : ndarray, (n, 3, 3)
+            If asked for.
+
+        Raises
+        ------
+        InvalidPointsError
+            Points or matrices of another number than the weights, or not finite.
+        PointCloudError
+            A rounding below zero.
+        """
+        check_switches(dual_quaternions=dual_quaternions, gradients=gradients)
+        count, bones = self._shape
+        places = check_positions(points, count, "points", "point")
+        given = _check_matrices(matrices)
+        if len(given) != bones:
+            raise InvalidPointsError(
+                f"There are weights of {bones} bones, and matrices of {len(given)}. Give one of each."
+            )
+        least = max(not_negative(rounding, "rounding"), _STRETCHED)
+        bend = _Screws(given, least).blended if dual_quaternions else partial(_blended_matrices, given)
+        moved, linears = np.empty((count, 3)), np.empty((count, 3, 3) if gradients else 0)
+
+        def work(block: _Block) -> None:
+            linear, shift = bend(block)
+            np.einsum("nij,nj->ni", linear, places[block.rows], out=moved[block.rows])
+            moved[block.rows] += shift
+            if gradients:
+                linears[block.rows] = linear
+
+        on_all_cores(work, self._blocks)
+        return (moved, linears) if gradients else moved
+
+
+class _Block:
+    """The weights of some of the points.
+
+    Attributes
+    ----------
+    rows : slice
+    table : sparse array, (m, b)
+    left : ndarray, (m,)
+        What the weights of a point leave to one, which does not move.
+    first : ndarray, (m,) int
+        The bone that each point follows most; the first one where it follows none.
+    pairs : ndarray, int
+        For each weight the number of that bone and of its own one, as of an entry of a table (b, b).
+    """
+
+    def __init__(self, rows: slice, table: sparse.csr_array) -> None:
+        self.rows, self.table = rows, table
+        self.left = 1.0 - np.asarray(table.sum(axis=1))
+        size = np.diff(table.indptr)
+        self.first = np.zeros(len(size), dtype=np.int64)
+        self.first[size > 0] = table.indices[_largest(table)]
+        self.pairs = np.repeat(self.first, size) * table.shape[1] + table.indices
+
+    def sums(self, values: Floats) -> Floats:
+        """Return the weighted sums of values of the bones, (b, k), as (m, k)."""
+        return np.asarray(self.table @ values)
+
+    def sided_sums(self, values: Floats, opposite: Bools) -> Floats:
+        """Return such sums of values that count negative beside bones to which they are opposite, (b, b)."""
+        turned = opposite.ravel()[self.pairs]
+        if not turned.any():
+            return self.sums(values)
+        data = np.where(turned, -self.table.data, self.table.data)
+        return np.asarray(
+            sparse.csr_array((data, self.table.indices, self.table.indptr), shape=self.table.shape) @ values
+        )
+
+
+def _blended_matrices(given: Floats, block: _Block) -> tuple[Floats, Floats]:
+    """Return the linear parts, (m, 3, 3), and the shifts, (m, 3), of matrices blended by the weights of a block."""
+    blended = block.sums(given.reshape(-1, 12)).reshape(-1, 3, 4)
+    linear = blended[:, :, :3]
+    for axis in range(3):
+        linear[:, axis, axis] += block.left
+    return linear, blended[:, :, 3]
+
+
+class _Screws:
+    """The motions of bones as dual quaternions.
+
+    A bone that stretches shifts each point by its stretch there before it turns, so that its screw depends on the
+    place. That is linear, and so is the blend.
+    """
+
+    def __init__(self, given: Floats, rounding: float) -> None:
+        linear = given[:, :, :3]
+        turn = np.moveaxis(nearest_rotations(np.ascontiguousarray(np.moveaxis(linear, 0, 2))), 2, 0)
+        self._real = _quaternions(turn)
+        stretch, none = linear - turn, np.zeros(len(given))
+        self._stretched = bool(np.abs(stretch).max(initial=0.0) > rounding)
+        columns = [given[:, :, 3], *(np.moveaxis(stretch, 2, 0) if self._stretched else ())]
+        duals = [0.5 * _product((none, *column.T), self._real.T).T for column in columns]
+        self._values = np.concatenate([self._real, *duals], axis=1)
+        self._opposite = self._real @ self._real.T < 0.0
+
+    def blended(self, block: _Block) -> tuple[Floats, Floats]:
+        """Return the linear parts, (m, 3, 3), and the shifts, (m, 3), of screws blended by the weights of a block."""
+        mixed = np.ascontiguousarray(block.sided_sums(self._values, self._opposite).T)
+        mixed[0] += np.where(self._real[block.first, 0] < 0.0, -block.left, block.left)
+        length = np.sqrt(np.einsum("qn,qn->n", mixed[:4], mixed[:4]))
+        mixed /= np.where(length > 0.0, length, 1.0)
+        back = mixed[:4] * np.array([1.0, -1.0, -1.0, -1.0])[:, None]
+        linear = _matrices(mixed[:4])
+        shift, *stretch = (2.0 * _product(dual, back)[1:] for dual in mixed[4:].reshape(-1, 4, mixed.shape[1]))
+        for axis, column in enumerate(stretch):
+            linear[:, :, axis] += column.T
+        return linear, shift.T
+
+
+def _check_matrices(matrices: ArrayLike) -> Floats:
+    """Return matrices of bones, (b, 3, 4)."""
     advice = "Give a 3 x 4 or 4 x 4 matrix for each bone."
     given = as_doubles(check_array(matrices, "Matrices", [(None, 3, 4), (None, 4, 4)], advice))[:, :3]
     check_finite(given, "matrices", advice)
-    count = len(check_array(points, "Points", [(None, 3)], "Give x, y, z for each point."))
-    places = check_positions(points, count, "points", "point")
-    table = _table(weights, (count, len(given)))
-    left = 1.0 - table.sum(axis=1)
-    linear, shift = given[:, :, :3], given[:, :, 3]
-    if dual_quaternions:
-        turn = np.moveaxis(nearest_rotations(np.ascontiguousarray(np.moveaxis(linear, 0, 2))), 2, 0)
-        stretch = np.einsum("bji,bjk->bik", turn, linear)
-        turns, shifts = _blend_screws(table, turn, shift, left)
-        linears = turns @ (_blend(table, stretch) + left[:, None, None] * np.eye(3))
-    else:
-        shifts = table @ shift
-        linears = _blend(table, linear) + left[:, None, None] * np.eye(3)
-    moved = np.matmul(linears, places[:, :, None])[:, :, 0] + shifts
-    return (moved, linears) if gradients else moved
+    return given
 
 
-def _table(weights: Any, shape: tuple[int, int]) -> sparse.csr_array:
+def _check_table(weights: Any, shape: tuple[int | None, int | None]) -> sparse.csr_array:
     """Return weights as a sparse array of this shape.
 
     Raises
@@ -102,35 +276,29 @@ def _table(weights: Any, shape: tuple[int, int]) -> sparse.csr_array:
     InvalidPointsError
         Another shape, or not finite.
     """
-    advice = f"Give one row for each of {shape[0]} points, with a weight for each of {shape[1]} bones."
+    advice = "Give one row for each point, with a weight for each bone."
     if not sparse.issparse(weights):
         weights = sparse.csr_array(as_doubles(check_array(weights, "Weights", [shape], advice, "biuf")))
-    if weights.shape != shape or not np.isfinite(weights.data).all():
+    fits = all(wanted in (None, size) for wanted, size in zip(shape, weights.shape, strict=True))
+    if not fits or not np.isfinite(weights.data).all():
         raise InvalidPointsError(f"Weights have the shape {weights.shape}, or are not finite. {advice}")
-    return sparse.csr_array(weights, dtype=np.float64)
+    table = sparse.csr_array(weights, dtype=np.float64)
+    table.sum_duplicates()
+    return table
 
 
-def _blend(table: sparse.csr_array, matrices: Floats) -> Floats:
-    return np.asarray(table @ matrices.reshape(len(matrices), 9)).reshape(-1, 3, 3)
-
-
-def _blend_screws(table: sparse.csr_array, turn: Floats, shift: Floats, left: Floats) -> tuple[Floats, Floats]:
-    """Return rotations, (n, 3, 3), and shifts, (n, 3), of blended screws; what is left of a weight does not move."""
-    real = _quaternions(turn)
-    still = np.zeros(len(shift))
-    screw = np.concatenate([real.T, 0.5 * _product((still, *shift.T), real.T)]).T
-    # A rotation is that of two opposite quaternions: those on the side of one bone of the point are blended.
-    size = np.diff(table.indptr)
-    first = np.zeros(len(size), dtype=np.int64)
-    first[size > 0] = table.indices[_largest(table)]
-    side = np.einsum("pq,pq->p", real[table.indices], np.repeat(real[first], size, axis=0)) < 0.0
-    sided = sparse.csr_array((np.where(side, -table.data, table.data), table.indices, table.indptr), shape=table.shape)
-    blended = np.asarray(sided @ screw).T
-    blended[0] += np.where(real[first, 0] < 0.0, -left, left)
-    length = np.sqrt(np.einsum("qn,qn->n", blended[:4], blended[:4]))
-    blended = blended / np.where(length > 0.0, length, 1.0)
-    back = blended[:4] * np.array([1.0, -1.0, -1.0, -1.0])[:, None]
-    return _matrices(blended[:4]), 2.0 * _product(blended[4:], back)[1:].T
+def _named_table(weights: ArrayLike, bones: ArrayLike, count: int | None) -> sparse.csr_array:
+    """Return the weights of named bones, (n, k) both, as a sparse array, (n, count)."""
+    named = check_array(bones, "Bones", [(None, None)], "Give the numbers of the bones of each point.", "iu")
+    most = int(named.max(initial=-1)) + 1 if count is None else count
+    if named.size and not 0 <= named.min() <= named.max() < most:
+        raise InvalidPointsError(f"There are {most} bones, and others are named. Give numbers from 0 to {most - 1}.")
+    advice = "Give a weight for each bone that is named."
+    values = as_doubles(check_array(weights, "Weights", [named.shape], advice, "biuf"))
+    ends = named.shape[1] * np.arange(len(named) + 1)
+    table = sparse.csr_array((values.ravel(), named.ravel(), ends), shape=(len(named), most))
+    table.eliminate_zeros()
+    return _check_table(table, table.shape)
 
 
 def _largest(table: sparse.csr_array) -> Ints:
