@@ -100,9 +100,8 @@ class MESHFREE_OT_deform_bake(JobOperator, BoundOperator, bpy.types.Operator):
             if scene is None:
                 raise PointCloudError("The scene was deleted meanwhile. Nothing was baked.")
             if frames and not self._kept.holds():
-                followed = kind_of(obj).followed
                 raise PointCloudError(
-                    f'The {followed} of "{obj.name}" or the frame were changed meanwhile. Nothing was baked.'
+                    f'What "{obj.name}" follows or the frame were changed meanwhile. Nothing was baked.'
                 )
             scene.frame_set(number)
             self._kept.expect()

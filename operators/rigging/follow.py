@@ -50,7 +50,8 @@ class Bones:
         now = bone_matrices(posed.pose.bones, _names(obj), "matrix")
         changes = (now @ np.linalg.inv(_rest(obj)))[:, :3]
         relative, key, preserve = _to_armature(obj, armature, depsgraph), self.key(obj), _preserves_volume(obj)
-        checksums = [zlib.crc32(repr((key, preserve, carries(obj))).encode()), 0]
+        asked = (*key[1:], obj.meshfree.deform.groups_used, preserve, carries(obj))
+        checksums = [zlib.crc32(repr(asked).encode()), 0]
         numbers = np.concatenate([checksums, relative[:3].ravel(), changes.ravel()])
         return BonePose(key, numbers, changes, relative, preserve)
 
