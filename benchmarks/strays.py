@@ -36,6 +36,13 @@ ABOUT_RAW = """\
 Clouds as scanners give them. They hold stray points of their own: what is taken of poste_france lies more than 26
 spacings from the rest, most of it a thousand. Human, man and horse are vertices of meshes, of uneven density, and
 parts of Human and brain are nested shells, nearer to each other than strays are to them; tree is hardly a surface.
+
+What is taken wrongly lies together. Of tree these are tips of twigs, up to 34 points each, whose third neighbors are
+2.6 times as far as elsewhere, and two parts of 21 and 25 points; half of them have no three neighbors that show a
+surface. Of building it is the ground before the wall, 31 points and three groups of 6 to 8, which denser points of
+the wall judge; of Human the outer shell where a denser one is next to it, groups of 32 to 108 points. A weaker score
+where no surface is shown (4 in place of infinite) would keep a third of those of tree, but find 91 in place of 96 %
+of 10 % in its box.
 """
 
 

@@ -175,8 +175,8 @@ def _box(gui, *corners):
 def scroll(gui, steps):
     """Turn the mouse wheel over the sidebar, downwards if above zero."""
     x, y, width, height = gui.region("UI")
-    for _ in range(abs(steps)):
-        gui.click(x + 0.4 * width, y + 0.5 * height, "wheel down" if steps > 0 else "wheel up")
+    if steps:
+        gui.click(x + 0.4 * width, y + 0.5 * height, "wheel down" if steps > 0 else "wheel up", abs(steps))
 
 
 def _find(gui, press, button):
@@ -236,9 +236,8 @@ def render(gui, quote, keep):
     gui.python("rendered = []; bpy.app.handlers.render_complete.append(lambda *_: rendered.append(True))")
     quote("Look at the coral from where you like, with room around it")
     x, y = gui.view_center()
-    gui.drag((x, y), (x + 60, y - 20), "middle")
-    for _ in range(4):
-        gui.click(x, y, "wheel down")
+    gui.drag((x, y), (x + 60, y - 20), button="middle")
+    gui.click(x, y, "wheel down", 4)
     quote("press Ctrl+Alt+Numpad 0")
     gui.key("ctrl+alt+KP_0")
     gui.wait_until("view3d()[0].spaces.active.region_3d.view_perspective == 'CAMERA'")

@@ -32,6 +32,7 @@ PICTURES = ROOT / "build" / "gui"
 SIZE = (1280, 800)
 START = 120  # seconds that Blender may take to start on a busy machine
 DRAWING = 240  # seconds that it may take to draw, when shaders for a graphics card are compiled for the processor
+_BUTTON = 16  # pixels, less than a button is high: none is passed over
 _BUTTONS = {"left": 1, "middle": 2, "right": 3, "wheel up": 4, "wheel down": 5}
 
 
@@ -225,17 +226,19 @@ class Window:
         """Move the mouse."""
         self._xdotool("mousemove", str(round(x)), str(round(y)))
 
-    def click(self, x, y, button="left"):
-        """Click at a place."""
+    def click(self, x, y, button="left", times=1):
+        """Click at a place, or turn the wheel there by some steps."""
         self.move(x, y)
-        self._xdotool("click", str(_BUTTONS[button]))
+        self._xdotool("click", "--repeat", str(times), "--delay", "20", str(_BUTTONS[button]))
 
-    def drag(self, start, end, button="left", steps=4):
-        """Drag from one place to another."""
+    def drag(self, start, *places, button="left", steps=4):
+        """Drag from one place to another, or along several."""
         self.move(*start)
         self._xdotool("mousedown", str(_BUTTONS[button]))
-        for step in range(1, steps + 1):
-            self.move(*(a + (b - a) * step / steps for a, b in zip(start, end, strict=True)))
+        for end in places:
+            for step in range(1, steps + 1):
+                self.move(*(a + (b - a) * step / steps for a, b in zip(start, end, strict=True)))
+            start = end
         self._xdotool("mouseup", str(_BUTTONS[button]))
 
     # The 3D view and its sidebar
@@ -339,7 +342,7 @@ class Window:
         """
         x, top, width, height = self.region(region)
         seen = []
-        for y in range(top + 8, top + height, 9):
+        for y in range(top + 8, top + height, _BUTTON):
             self.move(x + width * across, y)
             found = self.python(f"button_under_mouse({region!r})")
             if found.startswith(_written(operator)):

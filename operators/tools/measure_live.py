@@ -1,7 +1,8 @@
 """Measures that follow the selection in Edit Mode, in the panel: nothing is written to the object.
 
 A change of the selection is read from Blender's edit mesh, and measured in a thread when it has rested for a moment.
-Positions are read only where Blender tells that they may have changed.
+The volume of a closed surface, which does not depend on it, is measured once, after the first selection. Positions are
+read only where Blender tells that they may have changed.
 """
 
 import zlib
@@ -24,7 +25,8 @@ from ..objects.result import same_lengths
 from ..registration import Registration, Row
 from ..running.job import Job
 from ..running.ready import TROUBLES, error_text
-from .measuring import left_out, measured, volume_plane
+from .measuring import Figure, left_out, measured, volume_plane
+from .mesh import volume_of
 from .select import SelectionOperator, analyzed, selection
 
 _REST = 0.2  # seconds without a change after which the selection is measured
@@ -47,13 +49,15 @@ class _Followed:
     seen : tuple or None
         The selection and the plane that the figures are of, or will be.
     work : Job or None
-        The thread that measures them.
+        The thread that measures them, or the volume of the surface; its result is what to do with that.
     due : float
         When to look at the selection; infinite if nothing has changed.
     moved : bool
         Whether points may have been moved since they were looked at.
     figures : list of Figure
     notices : list of str
+    whole : tuple of both, or None
+        Of the surface as a whole: empty if it is open, None until it is measured.
     """
 
     uid: int
@@ -65,6 +69,7 @@ class _Followed:
     moved: bool = True
     figures: list = field(default_factory=list)
     notices: list = field(default_factory=list)
+    whole: tuple | None = None
 
 
 _followed = []  # at most one
@@ -116,7 +121,8 @@ class MESHFREE_OT_measure_live(SelectionOperator, bpy.types.Operator):
         """Begin to follow an object, back in Edit Mode: with shape keys it has other positions there."""
         if done == {"FINISHED"}:
             stop()
-            _followed.append(_Followed(obj.session_uid, self._laplacian, _state(obj)))
+            whole = ([], []) if self._laplacian.boundary.any() else None
+            _followed.append(_Followed(obj.session_uid, self._laplacian, _state(obj), whole=whole))
             _soon()
         return done
 
@@ -210,10 +216,25 @@ def _look(known, obj):
 
     def compute(progress):
         found = measured(laplacian, chosen, plane, progress)
-        return found.figures, [*notices, *found.notices]
+        return lambda: _show(known, found.figures, [*notices, *found.notices])
 
     _halt(known)
     known.seen, known.work = seen, Job("Measure Live", [], compute)
+
+
+def _enclose(known):
+    """Begin to measure the volume of a closed surface."""
+    laplacian = known.laplacian
+
+    def compute(progress):
+        try:
+            found = volume_of(laplacian, progress)
+        except PointCloudError as error:
+            text = f"The volume of the surface was not measured: {error}"
+            return lambda: _enclosed(known, [], [text])
+        return lambda: _enclosed(known, [Figure("Volume", (found.volume,), found.uncertainty, 3)], found.notices)
+
+    known.work = Job("Measure Live", [], compute)
 
 
 def _check_unchanged(known, obj):
@@ -247,18 +268,28 @@ def _halt(known):
 
 
 def _take(known):
-    """Show the result of the thread."""
+    """Show the result of the thread, and measure the surface as a whole if that is left."""
     work, known.work = known.work, None
     try:
-        _show(known, *work.result())
+        work.result()()
     except Cancelled:
         return
     except TROUBLES as error:
         _show(known, [], [error_text(error)])
+    if known.figures and known.whole is None:
+        _enclose(known)
+
+
+def _enclosed(known, figures, notices):
+    """Show the volume of the surface beside the figures of the selection, from now on."""
+    known.whole = figures, notices
+    _show(known, known.figures, known.notices)
 
 
 def _show(known, figures, notices):
-    known.figures, known.notices = figures, notices
+    """Show figures of the selection, and where there are some those of the whole surface."""
+    whole = known.whole if figures and known.whole is not None else ([], [])
+    known.figures, known.notices = [*figures, *whole[0]], [*notices, *whole[1]]
     notify("panels_changed")
 
 

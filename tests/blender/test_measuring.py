@@ -176,6 +176,40 @@ class TestLive:
         assert "Above the Plane" not in figures
         assert "at its rim" in notices[0]
 
+    def test_the_volume_of_a_closed_surface_is_measured_once(self, live, monkeypatch):
+        figures, _ = self.shown(live)
+        assert figures["Volume"][0] == pytest.approx(4.0 * np.pi / 3.0, rel=0.01)
+        again = []
+        monkeypatch.setattr(part("operators.tools.measure_live"), "volume_of", lambda *_: again.append(_))
+        bpy.ops.mesh.select_all(action="INVERT")
+        assert self.shown(live)[0]["Volume"] == figures["Volume"]
+        assert list(self.shown(live)[0])[-1] == "Volume"
+        assert again == []
+
+    def test_why_there_is_no_volume_of_the_surface_is_told_beside_the_other_figures(self, obj, monkeypatch):
+        def refuse(*_):
+            raise part("core").PointCloudError("There is no mesh")
+
+        module = part("operators.tools.measure_live")
+        monkeypatch.setattr(module, "volume_of", refuse)
+        choose(obj, local_points(obj)[:, 2] > 0.0)
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.meshfree.measure_live()
+        figures, notices = self.shown(obj)
+        module.stop()
+        assert "Area" in figures
+        assert "Volume" not in figures
+        assert "not measured: There is no mesh" in notices[-1]
+
+    def test_an_open_surface_has_no_volume_of_its_own(self):
+        obj = add_object(sphere_points(1000)[sphere_points(1000)[:, 2] < 0.6])
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.meshfree.measure_live()
+        figures, _ = self.shown(obj)
+        part("operators.tools.measure_live").stop()
+        assert "Area" in figures
+        assert "Volume" not in figures
+
     def test_the_same_selection_is_not_measured_again(self, live, monkeypatch):
         module = part("operators.tools.measure_live")
         calls = []

@@ -57,6 +57,26 @@ def box(gui, low, high):
     gui.drag(*corners)
 
 
+def circle(gui, *places):
+    """Select the points along a line by a wide Circle Select, from the front."""
+    start, end = (gui.python(f"on_screen(({x}, 0.0, {z}))") for x, z in places)
+    gui.point_at_view()
+    gui.key("alt+a", "c", *["KP_Add"] * 10)
+    gui.drag(start, end)
+    gui.key("Return")
+
+
+def lasso(gui, *places):
+    """Select the points within a polygon by Lasso Select, from the front."""
+    corners = [gui.python(f"on_screen(({x}, 0.0, {z}))") for x, z in places]
+    gui.point_at_view()
+    gui.key("alt+a")
+    gui.run("xdotool", "keydown", "ctrl")
+    gui.drag(*corners, button="right")
+    gui.run("xdotool", "keyup", "ctrl")
+    gui.settle()
+
+
 def edit(gui):
     """Look from the front, in Edit Mode."""
     shading(gui, "WIREFRAME")
@@ -121,15 +141,16 @@ class TestMeasures:
     """Figures of selected points and of parts, and curves on the surface."""
 
     @pytest.mark.parametrize("opened", [("MESHFREE_PT_points",)], indirect=True)
-    def test_figures_follow_box_select_and_undo(self, opened):
+    def test_figures_follow_box_circle_lasso_and_undo(self, opened):
         gui = opened
         add_sphere(gui, 1500)
         edit(gui)
         box(gui, 0.5, 1.1)
         gui.open_tab()
         gui.press("meshfree.measure_live")
-        gui.wait_for(lambda: gui.python(FIGURES), "the figures are there", 90)
+        gui.wait_for(lambda: "Volume" in (gui.python(FIGURES) or ()), "the figures are there", 90)
         cap = gui.python(FIGURES)
+        assert cap["Volume"][0] == pytest.approx(4.0 * np.pi / 3.0, rel=0.01)
         assert cap["Area"][0] == pytest.approx(np.pi, rel=0.05)
         box(gui, 0.0, 1.1)
         gui.wait_for(lambda: gui.python(FIGURES).get("Area", [0.0])[0] > 5.0, "they are of the half")
@@ -143,7 +164,20 @@ class TestMeasures:
         gui.wait_for(lambda: gui.python(FIGURES) == cap, "they are of the cap again")
         gui.key("alt+a")
         gui.wait_for(lambda: gui.python(FIGURES) == {}, "there are none")
-        gui.shot("measure_live_nothing")
+        for draw, places in (
+            (circle, [(-0.5, 0.0), (0.5, 0.0)]),
+            (lasso, [(-0.9, 0.0), (-0.9, 1.1), (0.9, 1.1), (0.9, 0.0)]),
+        ):
+            draw(gui, *places)
+            area = 4.0 * np.pi * gui.python(CHOSEN) / 1500
+            assert 0.5 < area < 7.0
+            # There may be figures of what was selected before the stroke ended.
+            gui.wait_for(
+                lambda area=area: gui.python(FIGURES).get("Area", [0.0])[0] == pytest.approx(area, rel=0.15),
+                "they are of what is selected",
+            )
+            gui.key("alt+a")
+            gui.wait_for(lambda: gui.python(FIGURES) == {}, "there are none")
         gui.key("Tab")
         gui.wait_for(lambda: gui.python(FIGURES) is None, "they are gone")
         assert gui.python("everything(bpy.context.object)['settings'] == before['settings']")

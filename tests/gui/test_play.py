@@ -184,7 +184,7 @@ class TestJobs:
         view = "[list(row) for row in view3d()[0].spaces.active.region_3d.view_matrix]"
         before = gui.python(view)
         x, y = gui.view_center()
-        gui.drag((x, y), (x + 100, y + 30), "middle")
+        gui.drag((x, y), (x + 100, y + 30), button="middle")
         gui.wait_for(lambda: gui.python(view) != before, "the view has turned")
         finish(gui)
         assert gui.python("bpy.context.object.data.shape_keys.key_blocks.keys()") == ["Basis", "Smooth"]

@@ -12,6 +12,7 @@ from ..surfaces.meshing import SurfaceMesh, mesh_surface
 
 NOISE = 0.12  # of the noise that a surface through noisy points may be off as a whole
 _HIDDEN = 0.2  # of the area of an opening times its radius, within which the surface that closes it is taken to be
+_TUBE = 1.0  # radii that a surface may go on at an opening where it stands upright; with a dome nearly its width
 _MIXED = 0.05  # share of the area whose normals may point to the other side before it is said
 
 
@@ -58,7 +59,7 @@ def enclosed_volume(
     Returns
     -------
     EnclosedVolume
-        An open surface is no error: its openings are closed, and the uncertainty holds what may lie beyond them.
+        An open surface is no error: its openings are closed, and the uncertainty holds a dome or a tube beyond.
 
     Raises
     ------
@@ -78,8 +79,9 @@ def enclosed_volume(
     normals of its vertices. The area elements with the normals at the points would do only to first order. An opening
     is closed by triangles around its centre, and by a part of the spherical dome that continues the surface around it:
     all of it in a surface that is smooth there, none where the surface ends upright, as that of an open vessel. The
-    uncertainty covers both, and a fifth of the radius more. Of noise, a surface through the points may be off by 12 %
-    of its height, towards the inside of curved parts.
+    uncertainty covers both, a fifth of the radius more, and where the surface ends upright a tube as long as it is
+    wide. A longer part that is cut off, such as a limb, is not in it. Of noise, a surface through the points may be off
+    by 12 % of its height, towards the inside of curved parts.
 
     Examples
     --------
@@ -242,7 +244,7 @@ class _Caps:
         high = radius * np.tan(0.5 * angle)
         dome = np.pi * high * (3.0 * radius**2 + high**2) / 6.0
         share = np.cos(angle)
-        doubt = np.maximum(share, 1.0 - share) * np.abs(dome) + _HIDDEN * area * radius
+        doubt = np.maximum(share, 1.0 - share) * np.abs(dome) + (_HIDDEN + _TUBE * (1.0 - share)) * area * radius
         return share * dome, doubt
 
 
@@ -316,7 +318,8 @@ def _notices(faces: Array, opening: Ints, inside: Bools, mixed: float) -> list[s
     if len(opening):
         result.append(
             f"{len(opening)} openings in {len(np.unique(opening))} of {len(faces)} components were closed to measure"
-            " the volume; the uncertainty holds what may lie beyond them."
+            " the volume; the uncertainty holds a dome, or a tube as long as it is wide, beyond each, and no longer"
+            " part that is cut off."
         )
     if inside.any():
         result.append(f"{np.count_nonzero(inside)} of {len(faces)} components lie inside others: they are cavities.")
