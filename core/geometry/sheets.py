@@ -243,7 +243,7 @@ def sheet_neighbors(nearest: Nearest, normals: Floats, oriented: bool) -> Bools:
     return result
 
 
-def separate_sheets(pairs: Pairs, nearest: Nearest, oriented: Floats) -> Pairs:
+def separate_sheets(pairs: Pairs, nearest: Nearest, oriented: Floats, sides: Floats) -> Pairs:
     """Leave out the pairs whose ends lie on different sheets, which face each other across a gap.
 
     Normals decide it for most pairs. Where they leave a doubt, two points lie on one sheet if a path of short steps
@@ -257,6 +257,10 @@ def separate_sheets(pairs: Pairs, nearest: Nearest, oriented: Floats) -> Pairs:
         Of the m points.
     oriented : ndarray, (m, 3)
         Unit normals whose signs agree.
+    sides : ndarray, (m, 3)
+        Those of the smooth side that each point lies on, between edges, by which the steps go: next to an edge or in
+        the mouth of a narrow slot the others are a mean of both sides, which leads across. For whole pairs that mean is
+        right: by the normals of sides all pairs over edges would be in doubt, where steps are long detours.
 
     Returns
     -------
@@ -268,7 +272,7 @@ def separate_sheets(pairs: Pairs, nearest: Nearest, oriented: Floats) -> Pairs:
         return pairs
     first, second = pairs.first[doubtful], pairs.second[doubtful]
     longest = _AROUND * pairs.distance[doubtful]
-    apart = ways_along(step_lengths(nearest, oriented), nearest.tree, first, second, longest) > longest
+    apart = ways_along(step_lengths(nearest, sides), nearest.tree, first, second, longest) > longest
     kept = np.ones(len(pairs.first), dtype=bool)
     kept[doubtful[apart]] = False
     return pairs.keep(kept) if apart.any() else pairs
