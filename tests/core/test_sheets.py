@@ -15,6 +15,7 @@ from benchmarks.samplings import (
     sausage_bend,
     torus_points,
 )
+from core.geometry import sheets
 from core.geometry.cloud import read_cloud
 from core.geometry.nearest import find_nearest
 from core.geometry.pairs import Pairs, find_pairs
@@ -269,6 +270,22 @@ class TestWays:
 
         assert crossing(normals) == 0
         assert crossing(mean) > 20
+
+    def test_points_that_would_lose_nearly_all_pairs_keep_them(self, rolled, monkeypatch):
+        nearest, normals, way = rolled
+        alone, lengths = 0, np.full(len(way), 1.6)
+        pairs = Pairs(nearest.points, lengths, *find_pairs(nearest.tree, lengths))
+        own = (pairs.first == alone) | (pairs.second == alone)
+
+        def measured(steps, tree, first, second, longest):
+            length = ways_along(steps, tree, first, second, longest)
+            return np.where((first == alone) | (second == alone), np.inf, length)
+
+        monkeypatch.setattr(sheets, "ways_along", measured)
+        monkeypatch.setattr(sheets, "_plainly_on_one_sheet", lambda pairs, *_: np.zeros(len(pairs.first), dtype=bool))
+        kept = separate_sheets(pairs, nearest, normals, normals)
+        assert np.count_nonzero((kept.first == alone) | (kept.second == alone)) == np.count_nonzero(own) > 12
+        assert len(kept.first) < len(pairs.first)
 
     def test_longer_ones_than_asked_for_are_infinite(self, rolled):
         nearest, normals, _ = rolled
