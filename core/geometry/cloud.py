@@ -206,7 +206,7 @@ def read_cloud(
     own = oriented if given is None else given
 
     report("Neighbors", 0.4)
-    pairs = separate_sheets(pairs, nearest, oriented) if options.sheets else pairs
+    pairs = separate_sheets(pairs, nearest, oriented, sides.normals) if options.sheets else pairs
     side = np.sign(np.einsum("ij,ij->i", own, quadrics.normals))
     return Cloud(
         scaled=sample.scaled,

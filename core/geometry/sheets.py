@@ -14,7 +14,7 @@ from ..algebra import blocks, on_all_cores
 from ..types import Array, Bools, Floats, Ints
 from .components import label_connected, number_by_size
 from .distances import pair_heights
-from .nearest import COUNT, NEXT, ON, SMOOTH, Nearest
+from .nearest import COUNT, FEW, NEXT, ON, SMOOTH, Nearest
 from .pairs import Pairs
 from .patches import Patch
 from .quadrics import Quadrics, check_surface, fit_quadrics, frames
@@ -243,11 +243,12 @@ def sheet_neighbors(nearest: Nearest, normals: Floats, oriented: bool) -> Bools:
     return result
 
 
-def separate_sheets(pairs: Pairs, nearest: Nearest, oriented: Floats) -> Pairs:
+def separate_sheets(pairs: Pairs, nearest: Nearest, oriented: Floats, sides: Floats) -> Pairs:
     """Leave out the pairs whose ends lie on different sheets, which face each other across a gap.
 
     Normals decide it for most pairs. Where they leave a doubt, two points lie on one sheet if a path of short steps
-    joins them along it that is not much longer than their distance.
+    joins them along it that is not much longer than their distance. A point that would keep fewer than a dozen pairs,
+    such as one that lies off all sheets, keeps all of them, as in `Nearest.keep`: on so few it would swing for itself.
 
     Parameters
     ----------
@@ -257,6 +258,10 @@ def separate_sheets(pairs: Pairs, nearest: Nearest, oriented: Floats) -> Pairs:
         Of the m points.
     oriented : ndarray, (m, 3)
         Unit normals whose signs agree.
+    sides : ndarray, (m, 3)
+        Those of the smooth side that each point lies on, between edges, by which the steps go: next to an edge or in
+        the mouth of a narrow slot the others are a mean of both sides, which leads across. For whole pairs that mean is
+        right: by the normals of sides all pairs over edges would be in doubt, where steps are long detours.
 
     Returns
     -------
@@ -268,9 +273,12 @@ def separate_sheets(pairs: Pairs, nearest: Nearest, oriented: Floats) -> Pairs:
         return pairs
     first, second = pairs.first[doubtful], pairs.second[doubtful]
     longest = _AROUND * pairs.distance[doubtful]
-    apart = ways_along(step_lengths(nearest, oriented), nearest.tree, first, second, longest) > longest
+    apart = ways_along(step_lengths(nearest, sides), nearest.tree, first, second, longest) > longest
     kept = np.ones(len(pairs.first), dtype=bool)
     kept[doubtful[apart]] = False
+    left = np.bincount(np.append(pairs.first[kept], pairs.second[kept]), minlength=len(sides))
+    few = left < FEW
+    kept |= few[pairs.first] | few[pairs.second]
     return pairs.keep(kept) if apart.any() else pairs
 
 

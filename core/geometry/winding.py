@@ -54,21 +54,26 @@ def orient_by_winding(nearest: Nearest, normals: Floats, place: Floats, part: In
 def divide_patches(points: Floats, normals: Floats, tree: sparse.csr_array) -> Ints:
     """Number patches of points, (m,), joined by links of the tree over which the sign is beyond doubt.
 
-    Small patches are joined to their surest neighbour, round by round, until none is left.
+    Small patches are joined to their surest neighbour, round by round, until none is left, and larger ones as well
+    while there are too many: a wall in a narrow slot of which half the points belong to no patch but that of the other
+    wall would get its sign from there.
     """
     count = len(points)
     tree = tree.tocoo()
     first, second = tree.coords
     certainty = _certainty(points, normals, first, second)
     joined = certainty > _CERTAIN
-    least = max(NEIGHBORS, count // _PATCHES)
+    least = NEIGHBORS
     while True:
         links = sparse.csr_array((joined[joined], (first[joined], second[joined])), shape=(count, count))
         _, patch = connected_components(links, directed=False)
         small = np.bincount(patch) < least
         open_ = np.flatnonzero(~joined & (small[patch[first]] | small[patch[second]]))
         if not len(open_):
-            return patch
+            if len(small) <= _PATCHES or small.all():
+                return patch
+            least *= 2
+            continue
         surest = open_[np.argsort(certainty[open_], kind="stable")]
         best = np.full(len(small), -1)
         best[patch[first[surest]]] = surest  # the last assignment, of the surest, stays

@@ -9,7 +9,7 @@ from benchmarks.samplings import fibonacci_sphere, torus_points
 from core.geometry import winding
 from core.geometry.nearest import find_nearest
 from core.geometry.orientation import _near_energies, _settled
-from core.geometry.winding import _energies, _least, _patch_energies, coupling
+from core.geometry.winding import _energies, _least, _patch_energies, coupling, divide_patches
 from tests.core.test_normals import torus_normals
 
 
@@ -152,6 +152,19 @@ def test_clumps_that_are_near_are_taken_finely(monkeypatch):
     near = np.abs(_patch_energies(points, points, weight, patch) - exact)[off].max()
     monkeypatch.setattr(winding, "_NEAR", 0.0)
     assert near < 0.1 * np.abs(_patch_energies(points, points, weight, patch) - exact)[off].max()
+
+
+def test_small_walls_of_a_slot_are_patches_of_their_own(monkeypatch):
+    """They are joined to each other, or to what is around, only where there are too many patches."""
+    floor = np.argwhere(np.ones((70, 70, 1))) * 1.0
+    wall = np.argwhere(np.ones((1, 4, 5))) + [33.7, 33.0, 1.0]
+    points = np.concatenate([floor, wall, wall[::-1] + [0.6, 0.0, 0.0]])
+    normals = np.repeat(np.eye(3)[[2, 0, 0]] * [[1.0], [1.0], [-1.0]], [4900, 20, 20], axis=0)
+    steps = np.arange(len(points) - 1)  # one after the other: from the floor to a wall, and on to the other one
+    tree = sparse.csr_array((np.ones(len(steps)), (steps, steps + 1)), shape=(len(points),) * 2)
+    np.testing.assert_array_equal(np.bincount(divide_patches(points, normals, tree)), [4900, 20, 20])
+    monkeypatch.setattr(winding, "_PATCHES", 2)
+    assert divide_patches(points, normals, tree).max() < 2
 
 
 def test_signs_of_least_energy_are_found_among_all():

@@ -15,9 +15,11 @@ from benchmarks.samplings import (
     sausage_bend,
     torus_points,
 )
+from core.geometry import sheets
 from core.geometry.cloud import read_cloud
 from core.geometry.nearest import find_nearest
-from core.geometry.sheets import fit_sheets, same_sheet, step_lengths, ways_along
+from core.geometry.pairs import Pairs, find_pairs
+from core.geometry.sheets import fit_sheets, same_sheet, separate_sheets, step_lengths, ways_along
 from core.options import LaplacianOptions
 
 
@@ -253,6 +255,37 @@ class TestWays:
         seen = exact < 25.0
         assert np.all(length[seen] > 0.85 * exact[seen])
         assert np.all(length[seen] < 1.4 * exact[seen])
+
+    def test_they_go_by_the_normals_of_sides(self, rolled):
+        """Where those of quadrics are a mean over the gap, only pairs both of whose ends have such a one cross it."""
+        nearest, normals, way = rolled
+        there = np.abs(np.abs(way - way.mean()) - 12.0) < 1.0
+        mean = np.where(there[:, None], np.eye(3)[0], normals)
+        pairs = Pairs(nearest.points, np.full(len(way), 1.6), *find_pairs(nearest.tree, np.full(len(way), 1.6)))
+
+        def crossing(sides):
+            kept = separate_sheets(pairs, nearest, mean, sides)
+            across = np.abs(way[kept.first] - way[kept.second]) > 15.0
+            return np.count_nonzero(across & ~(there[kept.first] & there[kept.second]))
+
+        assert crossing(normals) == 0
+        assert crossing(mean) > 20
+
+    def test_points_that_would_lose_nearly_all_pairs_keep_them(self, rolled, monkeypatch):
+        nearest, normals, way = rolled
+        alone, lengths = 0, np.full(len(way), 1.6)
+        pairs = Pairs(nearest.points, lengths, *find_pairs(nearest.tree, lengths))
+        own = (pairs.first == alone) | (pairs.second == alone)
+
+        def measured(steps, tree, first, second, longest):
+            length = ways_along(steps, tree, first, second, longest)
+            return np.where((first == alone) | (second == alone), np.inf, length)
+
+        monkeypatch.setattr(sheets, "ways_along", measured)
+        monkeypatch.setattr(sheets, "_plainly_on_one_sheet", lambda pairs, *_: np.zeros(len(pairs.first), dtype=bool))
+        kept = separate_sheets(pairs, nearest, normals, normals)
+        assert np.count_nonzero((kept.first == alone) | (kept.second == alone)) == np.count_nonzero(own) > 12
+        assert len(kept.first) < len(pairs.first)
 
     def test_longer_ones_than_asked_for_are_infinite(self, rolled):
         nearest, normals, _ = rolled
