@@ -1,5 +1,6 @@
 """Measurements on the points: neighbourhoods, components, normals, boundary, pairs; `cloud` runs the stages."""
 
+from .agreed import Agreed
 from .boundary import Boundary
 from .cloud import Cloud, Discs, estimate_normals, read_cloud, read_surface, surface_discs
 from .components import move_apart

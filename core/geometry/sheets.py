@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -17,7 +18,7 @@ from .distances import pair_heights
 from .nearest import COUNT, NEXT, ON, SMOOTH, Nearest
 from .pairs import Pairs
 from .patches import Patch
-from .quadrics import Quadrics, check_surface, fit_quadrics, frames
+from .quadrics import Quadrics, fit_quadrics, frames
 
 _LEANING = 0.1  # what normals may be off by, as a share of the distance
 _SEEDS = 9  # nearest neighbours, every two of which make such a plane
@@ -131,7 +132,6 @@ def fit_sheets(nearest: Nearest, before: Sheets | None = None, changed: Bools | 
     if before is None or changed is None:
         changed = np.ones(len(points), dtype=bool)
     mixed = nearest.quadrics
-    check_surface(mixed.roundness)
     spacing = nearest.spacing
     missed = mixed.misfit > ON * spacing
     planes = mixed.normals.copy()
@@ -243,7 +243,9 @@ def sheet_neighbors(nearest: Nearest, normals: Floats, oriented: bool) -> Bools:
     return result
 
 
-def separate_sheets(pairs: Pairs, nearest: Nearest, oriented: Floats) -> Pairs:
+def separate_sheets(
+    pairs: Pairs, nearest: Nearest, oriented: Floats, settle: Callable[[Callable[[], Ints]], Ints] = lambda find: find()
+) -> Pairs:
     """Leave out the pairs whose ends lie on different sheets, which face each other across a gap.
 
     Normals decide it for most pairs. Where they leave a doubt, two points lie on one sheet if a path of short steps
@@ -257,6 +259,8 @@ def separate_sheets(pairs: Pairs, nearest: Nearest, oriented: Floats) -> Pairs:
         Of the m points.
     oriented : ndarray, (m, 3)
         Unit normals whose signs agree.
+    settle : callable
+        See `step_lengths`.
 
     Returns
     -------
@@ -268,7 +272,7 @@ def separate_sheets(pairs: Pairs, nearest: Nearest, oriented: Floats) -> Pairs:
         return pairs
     first, second = pairs.first[doubtful], pairs.second[doubtful]
     longest = _AROUND * pairs.distance[doubtful]
-    apart = ways_along(step_lengths(nearest, oriented), nearest.tree, first, second, longest) > longest
+    apart = ways_along(step_lengths(nearest, oriented, settle), nearest.tree, first, second, longest) > longest
     kept = np.ones(len(pairs.first), dtype=bool)
     kept[doubtful[apart]] = False
     return pairs.keep(kept) if apart.any() else pairs
@@ -288,7 +292,9 @@ def _plainly_on_one_sheet(pairs: Pairs, oriented: Floats, spacing: Floats) -> Bo
     return result
 
 
-def step_lengths(nearest: Nearest, oriented: Floats) -> sparse.csr_array:
+def step_lengths(
+    nearest: Nearest, oriented: Floats, settle: Callable[[Callable[[], Ints]], Ints] = lambda find: find()
+) -> sparse.csr_array:
     """Return the lengths of the steps along sheets between next neighbours.
 
     Sharp folds, whose normals join them to nothing, are joined to what is nearest to them.
@@ -299,6 +305,8 @@ def step_lengths(nearest: Nearest, oriented: Floats) -> sparse.csr_array:
         Of m points.
     oriented : ndarray, (m, 3)
         Unit normals whose signs agree.
+    settle : callable
+        Takes `find_bridges` without arguments, and returns what it finds, or others that are agreed on.
 
     Returns
     -------
@@ -309,21 +317,30 @@ def step_lengths(nearest: Nearest, oriented: Floats) -> sparse.csr_array:
     count = len(next_to)
     first = np.repeat(np.arange(count, dtype=np.int32), np.count_nonzero(next_to, axis=1))
     second, length = nearest.index[next_to], nearest.distance[next_to]
-    label = connected_components(sparse.csr_array((length, (first, second)), shape=(count, count)), directed=False)[1]
-    row, column = np.nonzero(label[nearest.index] != label[:, None])
-    if len(row):
-        other, gap = nearest.index[row, column], nearest.distance[row, column]
-        low, high = np.sort([label[row], label[other]], axis=0)
-        order = np.lexsort((gap, high, low))
-        shortest = order[np.append(True, np.diff(low[order]) | np.diff(high[order]) != 0)]
-        low, high, row, other, gap = (values[shortest] for values in (low, high, row, other, gap))
-        shape = (label.max() + 1,) * 2
-        bridge = minimum_spanning_tree(sparse.csr_array((gap, (low, high)), shape=shape)).tocoo()
-        chosen = np.isin(low.astype(np.int64) * shape[0] + high, bridge.row.astype(np.int64) * shape[0] + bridge.col)
-        first = np.append(first, row[chosen]).astype(np.int32)
-        second, length = np.append(second, other[chosen]), np.append(length, gap[chosen])
     steps = sparse.csr_array((length, (first, second)), shape=(count, count))
+    row, other = settle(lambda: find_bridges(nearest, steps)).T
+    if len(row):
+        column = (nearest.index[row] == other[:, None]).argmax(axis=1)
+        ends = np.append(first, row).astype(np.int32), np.append(second, other)
+        steps = sparse.csr_array((np.append(length, nearest.distance[row, column]), ends), shape=(count, count))
     return steps.maximum(steps.T).tocsr()
+
+
+def find_bridges(nearest: Nearest, steps: sparse.csr_array) -> Ints:
+    """Return the shortest edges between neighbours that join what steps, (m, m), do not, (k, 2) int."""
+    label = connected_components(steps, directed=False)[1]
+    row, column = np.nonzero(label[nearest.index] != label[:, None])
+    if not len(row):
+        return np.zeros((0, 2), dtype=np.int64)
+    other, gap = nearest.index[row, column], nearest.distance[row, column]
+    low, high = np.sort([label[row], label[other]], axis=0)
+    order = np.lexsort((gap, high, low))
+    shortest = order[np.append(True, np.diff(low[order]) | np.diff(high[order]) != 0)]
+    low, high, row, other, gap = (values[shortest] for values in (low, high, row, other, gap))
+    shape = (label.max() + 1,) * 2
+    bridge = minimum_spanning_tree(sparse.csr_array((gap, (low, high)), shape=shape)).tocoo()
+    chosen = np.isin(low.astype(np.int64) * shape[0] + high, bridge.row.astype(np.int64) * shape[0] + bridge.col)
+    return np.column_stack([row, other])[chosen]
 
 
 def ways_along(steps: sparse.csr_array, tree: cKDTree, first: Ints, second: Ints, longest: Floats) -> Floats:
