@@ -286,6 +286,12 @@ def read_surface(
     return scaled, divide_sheets(surface, needed) if options.sheets else surface
 
 
+def gather(scaled: ScaledPoints, decisions: Decisions) -> Sample:
+    """Find the neighbours of all distinct points."""
+    count, nearest = len(scaled.points), look_across_rows(find_nearest(scaled.points))
+    return Sample(scaled, np.zeros(count, dtype=int), nearest, np.zeros(count), np.zeros((2, count)), decisions)
+
+
 def leave_outliers(
     scaled: ScaledPoints, needed: int, report: Report = lambda: None, decisions: Decisions | None = None
 ) -> Sample:
@@ -311,13 +317,15 @@ def leave_outliers(
     ComponentError
         Too few are left.
     """
-    count = len(scaled.points)
-    nearest = look_across_rows(find_nearest(scaled.points))
-    decisions = decisions or Decisions()
-    sample = Sample(scaled, np.zeros(count, dtype=int), nearest, np.zeros(count), np.zeros((2, count)), decisions)
+    sample = gather(scaled, decisions or Decisions())
     report()
-    usual = decisions.settle("spacing", lambda: float(np.median(nearest.spacing)))
-    return _regroup(sample, np.where(find_outliers(nearest, usual), -1, 0), needed)
+    return drop_outliers(sample, needed)
+
+
+def drop_outliers(sample: Sample, needed: int) -> Sample:
+    """Leave outliers out of a sample of one component, see `leave_outliers`."""
+    usual = sample.decisions.settle("spacing", lambda: float(np.median(sample.nearest.spacing)))
+    return _regroup(sample, np.where(find_outliers(sample.nearest, usual), -1, 0), needed)
 
 
 def divide_components(sample: Sample, needed: int) -> Sample:
@@ -378,7 +386,7 @@ def remove_noise(surface: Surface, options: LaplacianOptions) -> Surface:
     if options.projection == "off":
         return surface
     near = near_misfit(surface.sample.nearest)
-    noise = _noise(surface, near)
+    noise = measure_noise(surface, near)
     if options.projection != "auto":
         return _project(surface, noise, np.ones(len(noise), dtype=bool))[0]
     noisy, decisions, rounds = noise > 0.0, surface.sample.decisions, 0
@@ -390,7 +398,7 @@ def remove_noise(surface: Surface, options: LaplacianOptions) -> Surface:
         surface, changed = _project(surface, np.where(filling, first, noise), noisy)
         rows = np.flatnonzero(changed)
         near[rows] = near_misfit(surface.sample.nearest, rows)
-        noise = _noise(surface, near)
+        noise = measure_noise(surface, near)
         rounds += 1
         left = _roughly(surface, noise, filling, rounds)
         # What does not fall so fast is no noise, such as leaves.
@@ -399,7 +407,8 @@ def remove_noise(surface: Surface, options: LaplacianOptions) -> Surface:
     return replace(surface, sample=replace(surface.sample, noise=first))
 
 
-def _noise(surface: Surface, near: Floats) -> Floats:
+def measure_noise(surface: Surface, near: Floats) -> Floats:
+    """Return the noise of all points, (m,), by what quadrics through 20 neighbours miss these by: `noise_level`."""
     return noise_level(surface.sample.nearest, near, surface.mixed.misfit, surface.quadrics.misfit)
 
 

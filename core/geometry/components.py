@@ -41,15 +41,25 @@ def label_components(nearest: Nearest, usual: float | None = None) -> Ints:
     ndarray, (m,) int
         The largest component is 0. Those of fewer points than a neighbourhood has, 41, which get no operator, are -1.
     """
-    index, distance = nearest.index[:, 1:], nearest.distance[:, 1:]
-    reach = gap_reach(nearest)
-    usual = float(np.median(reach)) if usual is None else usual
+    index = nearest.index[:, 1:]
+    usual = float(np.median(gap_reach(nearest))) if usual is None else usual
+    strict, loose = find_gaps(nearest, usual)
+    large = number_by_size(label_connected(index, strict), COUNT) >= 0
+    loose &= large[:, None] & large[index]
+    return number_large(label_connected(index, strict | loose), large)
+
+
+def find_gaps(nearest: Nearest, usual: float) -> tuple[Bools, Bools]:
+    """Tell which edges to neighbours, (m, 40) bool, are no gaps, and which are none between components of some size."""
+    index, distance, reach = nearest.index[:, 1:], nearest.distance[:, 1:], gap_reach(nearest)
     strict = distance <= np.maximum(np.minimum(reach[:, None], reach[index]), usual)
-    close = number_by_size(label_connected(index, strict), COUNT)
-    large = close >= 0
-    loose = large[:, None] & large[index] & (distance <= np.maximum(reach[:, None], reach[index]))
-    result = np.full(len(close), -1)
-    result[large] = number_by_size(label_connected(index, strict | loose)[large], COUNT)
+    return strict, distance <= np.maximum(reach[:, None], reach[index])
+
+
+def number_large(label: Ints, large: Bools) -> Ints:
+    """Number components of points, the largest 0; those not among the large ones, or in a small component, are -1."""
+    result = np.full(len(label), -1)
+    result[large] = number_by_size(label[large], COUNT)
     return result
 
 

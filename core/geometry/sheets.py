@@ -198,6 +198,11 @@ def label_sheets(nearest: Nearest, normals: Floats, component: Ints) -> Ints:
         The largest component is 0; points off the surface are -1.
     """
     sheet = number_by_size(label_connected(nearest.index, sheet_neighbors(nearest, normals, False)), COUNT)
+    return number_sheets(join_touching(nearest, sheet), component)
+
+
+def join_touching(nearest: Nearest, sheet: Ints) -> Ints:
+    """Return the sheets of points, (m,), those on small ones, -1 before, with the sheet that they touch."""
     # Few points, such as sharp tips, are joined to the sheet that they touch; what touches none lies off the surface.
     touching = nearest.distance <= _AROUND * nearest.spacing[nearest.index]
     lost = np.flatnonzero(sheet < 0)
@@ -207,6 +212,11 @@ def label_sheets(nearest: Nearest, normals: Floats, component: Ints) -> Ints:
         if len(left) == len(lost):
             break
         lost = left
+    return sheet
+
+
+def number_sheets(sheet: Ints, component: Ints) -> Ints:
+    """Number sheets within components, the largest 0; points on no sheet are -1."""
     result = np.full(len(sheet), -1)
     known = sheet >= 0
     result[known] = number_by_size(sheet[known] + (sheet.max() + 1) * component[known], smallest=0)
@@ -318,7 +328,7 @@ def step_lengths(
     first = np.repeat(np.arange(count, dtype=np.int32), np.count_nonzero(next_to, axis=1))
     second, length = nearest.index[next_to], nearest.distance[next_to]
     steps = sparse.csr_array((length, (first, second)), shape=(count, count))
-    row, other = settle(lambda: find_bridges(nearest, steps)).T
+    row, other = settle(lambda: find_bridges(nearest, connected_components(steps, directed=False)[1])).T
     if len(row):
         column = (nearest.index[row] == other[:, None]).argmax(axis=1)
         ends = np.append(first, row).astype(np.int32), np.append(second, other)
@@ -326,21 +336,26 @@ def step_lengths(
     return steps.maximum(steps.T).tocsr()
 
 
-def find_bridges(nearest: Nearest, steps: sparse.csr_array) -> Ints:
-    """Return the shortest edges between neighbours that join what steps, (m, m), do not, (k, 2) int."""
-    label = connected_components(steps, directed=False)[1]
+def find_bridges(nearest: Nearest, label: Ints) -> Ints:
+    """Return the shortest edges between neighbours that join points of different labels, (m,): (k, 2) int."""
     row, column = np.nonzero(label[nearest.index] != label[:, None])
-    if not len(row):
-        return np.zeros((0, 2), dtype=np.int64)
     other, gap = nearest.index[row, column], nearest.distance[row, column]
-    low, high = np.sort([label[row], label[other]], axis=0)
+    return np.column_stack([row, other])[choose_bridges(label[row], label[other], gap)]
+
+
+def choose_bridges(left: Ints, right: Ints, gap: Floats) -> Ints:
+    """Return which edges join all labels with the least gaps, (k,) int, by the labels of their ends."""
+    if not len(gap):
+        return np.zeros(0, dtype=np.int64)
+    low, high = np.sort([left, right], axis=0)
     order = np.lexsort((gap, high, low))
     shortest = order[np.append(True, np.diff(low[order]) | np.diff(high[order]) != 0)]
-    low, high, row, other, gap = (values[shortest] for values in (low, high, row, other, gap))
-    shape = (label.max() + 1,) * 2
+    low, high, gap = (values[shortest] for values in (low, high, gap))
+    shape = (high.max() + 1,) * 2
     bridge = minimum_spanning_tree(sparse.csr_array((gap, (low, high)), shape=shape)).tocoo()
     chosen = np.isin(low.astype(np.int64) * shape[0] + high, bridge.row.astype(np.int64) * shape[0] + bridge.col)
-    return np.column_stack([row, other])[chosen]
+    chosen_edges: Ints = shortest[chosen]
+    return chosen_edges
 
 
 def ways_along(steps: sparse.csr_array, tree: cKDTree, first: Ints, second: Ints, longest: Floats) -> Floats:
