@@ -25,7 +25,7 @@ from .doubt import Doubt
 from .moments import LARGEST, MET, TERMS, EdgeTerms, put_terms
 from .nearest import COUNT, ON, ROUNDS, SMOOTH, fading_weights, find_nearest, nearest_rows, typical_distance
 from .noise import FILLING, near_misfit
-from .normals import near_edges, outer_signs, unit_normals
+from .normals import mirrored_cosine, near_edges, outer_signs, unit_normals
 from .orientation import orient_normals, toward
 from .pairs import Pairs, find_pairs
 from .patches import Patch
@@ -37,4 +37,4 @@ from .sheets import choose_bridges, join_touching, number_sheets, same_sheet, sh
 from .strays import PARTS, label_parts, stray_scores, without
 from .subset import blue_noise_subset, independent
 from .thinning import nearest_in_blocks, thin
-from .winding import orient_by_winding
+from .winding import orient_patches

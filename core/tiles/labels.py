@@ -43,36 +43,34 @@ def merge_links(links: Iterable[tuple[Ints, Ints, Ints]], count: int) -> Ints:
     return np.where(label >= 0, merged[label], -1)
 
 
-def agree_on_signs(first: Ints, second: Ints, votes: Floats, count: int) -> tuple[Floats, Ints]:
-    """Choose signs of pieces so that those that have points in common agree.
+def agree_on_signs(first: Ints, second: Ints, votes: Floats, count: int) -> Floats:
+    """Choose signs of patches so that those that have points in common agree.
 
     Parameters
     ----------
     first, second : ndarray, (k,) int
-        Two pieces.
+        Two patches.
     votes : ndarray, (k,)
-        Points in common at which their normals agree, less those at which they do not; where signs cannot please all
-        votes, the greatest count.
+        Above zero where their normals agree, below where they do not. Those on the same two patches add up; where signs
+        cannot please all sums, the greatest count.
     count : int
-        Pieces.
+        Patches.
 
     Returns
     -------
     ndarray, (count,)
         1 or -1.
-    ndarray, (count,) int
-        Number of the surface that the piece belongs to.
     """
     ends = np.concatenate([first, second]).astype(np.int32), np.concatenate([second, first]).astype(np.int32)
     signs = sparse.csr_array((np.concatenate([votes, votes]), ends), shape=(count, count))  # sums all votes of a pair
     cost = signs.copy()
-    cost.data = 1.0 / np.maximum(np.abs(signs.data), 0.5)
+    cost.data = 1.0 / np.maximum(np.abs(signs.data), 1e-6)
     forest = minimum_spanning_tree(cost)
     forest = (forest + forest.T).tocsr()
     surface = connected_components(forest, directed=False)[1]
     result = np.ones(count)
     for root in np.unique(surface, return_index=True)[1]:
         order, before = breadth_first_order(forest, root, directed=False)
-        for piece in order[1:]:
-            result[piece] = result[before[piece]] * (-1.0 if signs[before[piece], piece] < 0.0 else 1.0)
-    return result, surface
+        for patch in order[1:]:
+            result[patch] = result[before[patch]] * (-1.0 if signs[before[patch], patch] < 0.0 else 1.0)
+    return result

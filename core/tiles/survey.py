@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..geometry import (
@@ -31,12 +30,13 @@ from ..geometry import (
     gather,
     join_touching,
     measure_noise,
+    mirrored_cosine,
     near_edges,
     near_misfit,
     number_by_size,
     number_large,
     number_sheets,
-    orient_by_winding,
+    orient_patches,
     outer_signs,
     read_cloud,
     remove_noise,
@@ -50,6 +50,7 @@ from .cut import Tile
 from .labels import agree_on_signs, merge_links
 
 DEGREE = 24  # of the polynomials for areas: they reach less than a halo of 60 spacings, see docs/tiles.md
+_LINK = 1e-3  # weight of links between patches of one tile, against points that two tiles have in common
 _TRIAL = 8000  # points on which the weights are balanced, for the shares
 
 
@@ -58,6 +59,7 @@ def survey(
     tiles: Sequence[Tile],
     options: LaplacianOptions = LaplacianOptions(),
     *,
+    degree: int = DEGREE,
     progress: Progress | None = None,
 ) -> Agreed:
     """Find what all tiles of a cloud must agree on.
@@ -70,6 +72,9 @@ def survey(
         From `cut`.
     options : LaplacianOptions
         Settings.
+    degree : int
+        Of the polynomials that solve for areas. A lower one asks for less of a halo: 12 for 45 spacings. An operator of
+        all points at once has 100.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
@@ -97,7 +102,7 @@ def survey(
     1.0 0 False
     """
     check_options(options)
-    walk = _Walk(check_points(points), tiles, options)
+    walk = _Walk(check_points(points), tiles, options, degree)
     report = progress or (lambda stage, fraction: None)
     stages: tuple[Callable[[], None], ...] = (
         walk.place,
@@ -118,12 +123,12 @@ def survey(
 class _Walk:
     """The walk from coordinates to areas, on all tiles up to each decision, which then is made for all of them."""
 
-    def __init__(self, points: Floats, tiles: Sequence[Tile], options: LaplacianOptions) -> None:
+    def __init__(self, points: Floats, tiles: Sequence[Tile], options: LaplacianOptions, degree: int) -> None:
         self._points, self._tiles, self._options = points, tiles, options
         self._needed = options.neighbors + 1
         self._samples: list[Sample] = []
         self._surfaces: list[Surface] = []
-        self.agreed = Agreed(degree=DEGREE)
+        self.agreed = Agreed(degree=degree)
 
     def place(self) -> None:
         """Find the center, the scale and the usual spacing, and leave outliers out."""
@@ -189,25 +194,26 @@ class _Walk:
         self._put([divide_sheets(surface, self._needed) for surface in self._surfaces])
 
     def choose_sides(self) -> None:
-        """Choose the outer side of the surface: each tile for its pieces, then all tiles for these."""
-        oriented, pieces, offset = [], [], 0
+        """Choose the outer side of the surface: each tile for its patches, then all tiles for these."""
+        oriented, patches, votes, offset = [], [], [], 0
         for surface in self._surfaces:
-            sample = surface.sample
-            normals = orient_by_winding(sample.nearest, surface.quadrics.normals, sample.places, sample.component)
-            first, second = near_edges(sample.nearest)
-            graph = sparse.csr_array((np.ones(len(first), dtype=bool), (first, second)), shape=(len(normals),) * 2)
-            count, piece = connected_components(graph, directed=False)
+            nearest = surface.sample.nearest
+            normals, patch = orient_patches(nearest, surface.quadrics.normals, surface.sample.places)
+            first, second = near_edges(nearest)
+            alike = np.sign(mirrored_cosine(nearest.points, normals, first, second))
+            patch = patch + offset
+            across = patch[first] != patch[second]
+            votes.append(np.stack([patch[first], patch[second], _LINK * alike])[:, across])
             oriented.append(normals)
-            pieces.append(piece + offset)
-            offset += count
-        side, owner = self._gathered(oriented, 0.0), self._gathered(pieces, -1)
-        shared = []
-        for normals, piece, rows, inner in zip(oriented, pieces, self._rows(), self._masks(), strict=True):
+            patches.append(patch)
+            offset = patch.max() + 1
+        side, owner = self._gathered(oriented, 0.0), self._gathered(patches, -1)
+        for normals, patch, rows, inner in zip(oriented, patches, self._rows(), self._masks(), strict=True):
             common = ~inner & (owner[rows] >= 0)
-            vote = np.sign(np.einsum("ij,ij->i", normals[common], side[rows[common]]))
-            shared.append(np.stack([piece[common], owner[rows[common]], vote]))
-        first, second, votes = np.concatenate(shared, axis=1)
-        sign, _ = agree_on_signs(first.astype(int), second.astype(int), votes, offset)
+            alike = np.sign(np.einsum("ij,ij->i", normals[common], side[rows[common]]))
+            votes.append(np.stack([patch[common], owner[rows[common]], alike]))
+        first, second, weight = np.concatenate(votes, axis=1)
+        sign = agree_on_signs(first.astype(int), second.astype(int), weight, offset)
         known = owner >= 0
         side[known] *= sign[owner[known], None]
         label = self.agreed.component if self.agreed.sheet is None else self.agreed.sheet
@@ -232,7 +238,7 @@ class _Walk:
             ends.append(np.stack([rows[row], rows[nearest.index[row, column]]], axis=1))
             gaps.append(nearest.distance[row, column])
         edges = np.concatenate(ends)
-        self._settle(bridges=edges[choose_bridges(*label[edges.T], np.concatenate(gaps))])
+        self._settle(bridges=edges[choose_bridges(label[edges[:, 0]], label[edges[:, 1]], np.concatenate(gaps))])
 
     def scale_areas(self) -> None:
         """Find by how much the areas of each component are to be scaled."""
@@ -259,9 +265,9 @@ class _Walk:
         trial = build_laplacian(self._points[rows], options=self._options, agreed=self.agreed.among(rows, count))
         self._settle(shares=trial.agreed.shares)
 
-    def _settle(self, **values: Array | float | tuple[float, ...] | None) -> None:
+    def _settle(self, **values: Any) -> None:
         """Agree on something, and tell all tiles."""
-        self.agreed = replace(self.agreed, **values)  # type: ignore[arg-type]
+        self.agreed = replace(self.agreed, **values)
         self._samples = [
             replace(sample, decisions=Decisions(self.agreed.among(tile.rows, len(self._points))))
             for sample, tile in zip(self._samples, self._tiles, strict=False)  # no samples at the end
