@@ -25,10 +25,13 @@ class Tile:
         Which of the cloud's points, ascending.
     inner : ndarray, (k,) bool
         Which of these lie in the box; each point lies in that of one tile.
+    close : ndarray, (k,) bool
+        Which lie in the box or in the nearer half of the halo: the far end tells less, as its neighbours are missing.
     """
 
     rows: Ints
     inner: Bools
+    close: Bools
 
     @property
     def own(self) -> Ints:
@@ -92,9 +95,9 @@ def _divided(points: Floats, rows: Ints, count: int) -> list[Ints]:
 def _with_halo(points: Floats, spacing: Floats, own: Ints, halo: float) -> Tile:
     low, high = points[own].min(axis=0), points[own].max(axis=0)
     outside = np.linalg.norm(np.maximum(np.maximum(low - points, points - high), 0.0), axis=1)
-    near = outside <= halo * np.maximum(spacing, np.median(spacing[own]))
-    near[own] = True
+    away = outside / np.maximum(spacing, np.median(spacing[own]))  # in spacings
+    away[own] = 0.0
     inner = np.zeros(len(points), dtype=bool)
     inner[own] = True
-    rows = np.flatnonzero(near)
-    return Tile(rows, inner[rows])
+    rows = np.flatnonzero(away <= halo)
+    return Tile(rows, inner[rows], away[rows] <= 0.5 * halo)

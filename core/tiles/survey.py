@@ -208,8 +208,9 @@ class _Walk:
             patches.append(patch)
             offset = patch.max() + 1
         side, owner = self._gathered(oriented, 0.0), self._gathered(patches, -1)
-        for normals, patch, rows, inner in zip(oriented, patches, self._rows(), self._masks(), strict=True):
-            common = ~inner & (owner[rows] >= 0)
+        for number, (normals, patch, rows) in enumerate(zip(oriented, patches, self._rows(), strict=True)):
+            tile, first = self._tiles[number], self._samples[number].scaled.first
+            common = (tile.close & ~tile.inner)[first] & (owner[rows] >= 0)
             alike = np.sign(np.einsum("ij,ij->i", normals[common], side[rows[common]]))
             votes.append(np.stack([patch[common], owner[rows[common]], alike]))
         first, second, weight = np.concatenate(votes, axis=1)
