@@ -15,7 +15,7 @@ COUNT = 4000
 LENGTH, RADIUS = 12.0, 0.125  # of rods so long that tiles with halos are two thirds of them
 SPACING = np.sqrt(2.0 * np.pi * RADIUS * LENGTH / COUNT)
 LOW = Agreed(degree=12)  # reaches less far than the halos of these few points
-HALO = 48.0
+HALO = 45.0
 KINDS = ("noisy", "several")
 
 
