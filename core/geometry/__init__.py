@@ -19,7 +19,7 @@ from .cloud import (
     remove_noise,
     surface_discs,
 )
-from .components import find_gaps, gap_reach, label_connected, move_apart, number_by_size, number_large
+from .components import find_gaps, gap_reach, move_apart, number_by_size, number_large
 from .distances import arc_length, arc_squared, circle_arc, dots, pair_heights
 from .doubt import Doubt
 from .moments import LARGEST, MET, TERMS, EdgeTerms, put_terms

@@ -8,7 +8,9 @@ import pytest
 from scipy import sparse
 
 import core
-from core.geometry import Agreed
+from core.geometry import Agreed, find_nearest
+from core.geometry.boundary import no_boundary
+from core.geometry.moments import least_error
 from core.tiles.labels import agree_on_signs, merge_links
 
 COUNT = 4000
@@ -161,6 +163,18 @@ class TestSurvey:
         assert abs(first[1] - second[1]).max() <= 1e-6 * abs(second[1]).max()
         for name in ("areas", "mean_curvature", "normals"):
             same(first[0][name], second[0][name], 1e-6)
+
+
+def test_errors_of_moments_do_not_depend_on_which_points_are_asked_together():
+    points = np.random.default_rng(0).normal(size=(600, 3))
+    points /= np.linalg.norm(points, axis=1)[:, None]
+    areas, lengths = np.full(600, 4.0 * np.pi / 600), np.full(600, 0.2)
+    given = find_nearest(points), points, areas, no_boundary(600), lengths
+    together = least_error(*given, np.arange(600))
+    hard = np.flatnonzero(together > 1e-2)
+    assert 10 < len(hard) < 500
+    for rows in hard, np.flatnonzero(together < 1e-2)[:50]:
+        np.testing.assert_allclose(least_error(*given, rows), together[rows], rtol=1e-3, atol=1e-6)
 
 
 class TestLabels:
