@@ -72,7 +72,7 @@ class Agreed:
     >>> rows = np.flatnonzero(points[:, 2] > -0.8)
     >>> part = core.build_laplacian(points[rows], agreed=whole.agreed.among(rows, len(points)))
     >>> inner = points[rows, 2] > 0.8
-    >>> print(np.abs(part.smoothing_lengths / whole.smoothing_lengths[rows] - 1.0)[inner].max().round(9))
+    >>> print(np.abs(part.normals - whole.normals[rows])[inner].max().round(9))
     0.0
     """
 
