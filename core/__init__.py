@@ -29,7 +29,7 @@ def _read_homes() -> dict[str, str]:
 
 
 _HOMES = _read_homes()
-_PACKAGES = (*{home.partition(".")[0] for home in _HOMES.values()}, "files")
+_PACKAGES = (*{home.partition(".")[0] for home in _HOMES.values()}, "files", "tiles")
 _lock = threading.RLock()  # scipy imports itself in circles, which two threads at once might enter from two sides
 
 __all__ = sorted(_HOMES)

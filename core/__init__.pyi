@@ -106,6 +106,7 @@ from .errors import SolverError as SolverError
 from .errors import TooFewPointsError as TooFewPointsError
 from .errors import UnresolvedModesError as UnresolvedModesError
 from .example import example_sphere as example_sphere
+from .geometry import Agreed as Agreed
 from .geometry import Discs as Discs
 from .geometry import Doubt as Doubt
 from .geometry import Prolongation as Prolongation

@@ -8,6 +8,7 @@ from ..cores import cores
 from ..kernel import SUPPORT
 from ..options import LaplacianOptions
 from ..types import Floats, Ints
+from .agreed import Decisions
 from .boundary import Boundary
 from .cells import Cells
 from .moments import MET, least_error
@@ -28,6 +29,7 @@ def smoothing_lengths(
     boundary: Boundary,
     options: LaplacianOptions,
     component: Ints | None = None,
+    decisions: Decisions | None = None,
 ) -> Floats:
     """Choose h for every point.
 
@@ -46,6 +48,8 @@ def smoothing_lengths(
         Its bandwidth, neighbors and bandwidth_factor.
     component : ndarray, (m,) int, optional
         Component of each point; neighbours are counted within one.
+    decisions : Decisions, optional
+        Of the one length of "global".
 
     Returns
     -------
@@ -65,7 +69,8 @@ def smoothing_lengths(
         return lengths * _widening(nearest, normals, quadrics, cells, boundary, lengths)
     distance = _neighbor_distance(nearest.tree, options.neighbors, component)
     if options.bandwidth == "global":
-        return np.full(len(distance), options.bandwidth_factor * distance.mean())
+        mean = (decisions or Decisions()).settle("length", lambda: float(distance.mean()))
+        return np.full(len(distance), options.bandwidth_factor * mean)
     return options.bandwidth_factor * _repeat(nearest.averaging(), distance, 2)
 
 

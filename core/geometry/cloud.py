@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike
 from ..errors import ComponentError, TooFewPointsError
 from ..options import LaplacianOptions, check_options
 from ..types import Bools, Floats, Ints, Progress, Report
+from .agreed import Agreed, Decisions
 from .bandwidth import depth, mean_gaps, smoothing_lengths
 from .boundary import Boundary, find_boundary, given_boundary, measure_boundary, no_boundary
 from .cells import Cells, measure_cells
-from .components import label_components, move_apart
+from .components import gap_reach, label_components, move_apart
 from .distances import measure_squared_slope
 from .doubt import likely_causes
 from .edges import Sides, find_sides, one_side
@@ -49,6 +50,8 @@ class Sample:
         Noise that was smoothed at each point, as a share of the spacing; zero where none was.
     scatter : ndarray, (2, m)
         What quadrics missed the neighbours of each point by before that, see `likely_causes`; zero until it is known.
+    decisions : Decisions
+        What is decided for the points as a whole.
     """
 
     scaled: ScaledPoints
@@ -56,6 +59,7 @@ class Sample:
     nearest: Nearest
     noise: Floats
     scatter: Floats
+    decisions: Decisions = field(default_factory=Decisions)
 
     @property
     def moved(self) -> Floats:
@@ -120,6 +124,8 @@ class Cloud:
     boundary : Boundary
     pairs : Pairs
         Points as moved, smoothing lengths and pairs.
+    decisions : Decisions
+        What is decided for the points as a whole.
     notices : list of str
         Texts for the user.
     """
@@ -139,6 +145,7 @@ class Cloud:
     cause: Ints
     boundary: Boundary
     pairs: Pairs
+    decisions: Decisions
     notices: list[str]
 
 
@@ -150,6 +157,7 @@ def read_cloud(
     boundary_distance: ArrayLike | None = None,
     progress: Progress | None = None,
     left_out: ArrayLike = (),
+    agreed: Agreed | None = None,
 ) -> Cloud:
     """Go from coordinates to pairs.
 
@@ -159,7 +167,7 @@ def read_cloud(
         Coordinates [L].
     options : LaplacianOptions
         Settings.
-    normals, boundary, boundary_distance, progress, left_out
+    normals, boundary, boundary_distance, progress, left_out, agreed
         See `build_laplacian`.
 
     Returns
@@ -178,12 +186,16 @@ def read_cloud(
     kept = np.flatnonzero(~as_mask(left_out, len(points)))
     if not len(kept):
         raise TooFewPointsError(f"All {len(points)} points are named to be left out. Name fewer.")
-    scaled, surface = read_surface(points, options, report, kept)
+    scaled, surface = read_surface(points, options, report, kept, agreed)
     sample, quadrics, nearest = surface.sample, surface.quadrics, surface.sample.nearest
+    decisions = sample.decisions
 
     report("Normals", 0.18)
     given = None if normals is None else unit_normals(normals, len(points))[sample.scaled.first]
-    oriented = orient_by_winding(nearest, quadrics.normals if given is None else given, sample.places, sample.component)
+    own = quadrics.normals if given is None else given
+    oriented = decisions.sides(
+        sample.scaled, own, lambda: orient_by_winding(nearest, own, sample.places, sample.component)
+    )
 
     report("Neighbors", 0.2)
     gaussian = quadrics.gaussian_curvature
@@ -201,12 +213,14 @@ def read_cloud(
     if np.isfinite(edge.distance).any():
         cells = cells_within(edge, cells)
     report("Neighbors", 0.25)
-    lengths = smoothing_lengths(nearest, oriented, quadrics, cells, edge, options, sample.component)
+    lengths = smoothing_lengths(nearest, oriented, quadrics, cells, edge, options, sample.component, decisions)
     pairs = Pairs(nearest.points, lengths, *find_pairs(nearest.tree, lengths, lambda: report("Neighbors", 0.3)))
     own = oriented if given is None else given
 
     report("Neighbors", 0.4)
-    pairs = separate_sheets(pairs, nearest, oriented, sides.normals) if options.sheets else pairs
+    if options.sheets:
+        settle = functools.partial(decisions.bridges, sample.scaled)
+        pairs = separate_sheets(pairs, nearest, oriented, sides.normals, settle)
     side = np.sign(np.einsum("ij,ij->i", own, quadrics.normals))
     return Cloud(
         scaled=sample.scaled,
@@ -225,6 +239,7 @@ def read_cloud(
         cause=likely_causes(nearest, oriented, cells, sample.scatter),
         boundary=edge,
         pairs=pairs,
+        decisions=decisions,
         notices=_notices(
             duplicates=len(kept) - len(scaled.points),
             left_out=len(scaled.points) - len(own),
@@ -236,9 +251,15 @@ def read_cloud(
 
 
 def read_surface(
-    points: Floats, options: LaplacianOptions, report: Progress, kept: Ints | None = None
+    points: Floats,
+    options: LaplacianOptions,
+    report: Progress,
+    kept: Ints | None = None,
+    agreed: Agreed | None = None,
 ) -> tuple[ScaledPoints, Surface]:
     """Go from coordinates, checked, to quadrics; of some rows of them alone, if these are named.
+
+    What is agreed on for more points than these is taken as it is.
 
     Returns
     -------
@@ -248,11 +269,12 @@ def read_surface(
         Of those that take part.
     """
     needed = options.neighbors + 1
-    scaled = scale_points(points if kept is None else points[kept], needed)
+    decisions = Decisions(agreed)
+    scaled = scale_points(points if kept is None else points[kept], needed, decisions)
     if kept is not None:
         scaled = scaled.among(kept, len(points))
     report("Normals", 0.02)
-    sample = leave_outliers(scaled, needed, lambda: report("Normals", 0.04))
+    sample = leave_outliers(scaled, needed, lambda: report("Normals", 0.04), decisions)
     report("Normals", 0.06)
     sample = divide_components(sample, needed)
     report("Normals", 0.1)
@@ -265,7 +287,15 @@ def read_surface(
     return scaled, divide_sheets(surface, needed) if options.sheets else surface
 
 
-def leave_outliers(scaled: ScaledPoints, needed: int, report: Report = lambda: None) -> Sample:
+def gather(scaled: ScaledPoints, decisions: Decisions) -> Sample:
+    """Find the neighbours of all distinct points."""
+    count, nearest = len(scaled.points), look_across_rows(find_nearest(scaled.points))
+    return Sample(scaled, np.zeros(count, dtype=int), nearest, np.zeros(count), np.zeros((2, count)), decisions)
+
+
+def leave_outliers(
+    scaled: ScaledPoints, needed: int, report: Report = lambda: None, decisions: Decisions | None = None
+) -> Sample:
     """Leave out distinct points that do not lie on the surface of their neighbours.
 
     Parameters
@@ -275,6 +305,8 @@ def leave_outliers(scaled: ScaledPoints, needed: int, report: Report = lambda: N
         How many points must be left.
     report : callable
         Called between its two stages; may raise `Cancelled`.
+    decisions : Decisions, optional
+        For the sample; all are taken by these points if not given.
 
     Returns
     -------
@@ -286,11 +318,15 @@ def leave_outliers(scaled: ScaledPoints, needed: int, report: Report = lambda: N
     ComponentError
         Too few are left.
     """
-    count = len(scaled.points)
-    nearest = look_across_rows(find_nearest(scaled.points))
-    sample = Sample(scaled, np.zeros(count, dtype=int), nearest, np.zeros(count), np.zeros((2, count)))
+    sample = gather(scaled, decisions or Decisions())
     report()
-    return _regroup(sample, np.where(find_outliers(sample.nearest), -1, 0), needed)
+    return drop_outliers(sample, needed)
+
+
+def drop_outliers(sample: Sample, needed: int) -> Sample:
+    """Leave outliers out of a sample of one component, see `leave_outliers`."""
+    usual = sample.decisions.settle("spacing", lambda: float(np.median(sample.nearest.spacing)))
+    return _regroup(sample, np.where(find_outliers(sample.nearest, usual), -1, 0), needed)
 
 
 def divide_components(sample: Sample, needed: int) -> Sample:
@@ -312,7 +348,12 @@ def divide_components(sample: Sample, needed: int) -> Sample:
     ComponentError
         Too few are left.
     """
-    return _regroup(sample, label_components(sample.nearest), needed)
+    decisions = sample.decisions
+    usual = decisions.settle("reach", lambda: float(np.median(gap_reach(sample.nearest))))
+    label = decisions.label("component", sample.scaled, lambda: label_components(sample.nearest, usual))
+    divided = _regroup(sample, label, needed)
+    decisions.settle("smallest", lambda: int(np.bincount(divided.component).min()))
+    return divided
 
 
 def fit_surface(sample: Sample, sheets: bool, before: Surface | None = None, changed: Bools | None = None) -> Surface:
@@ -325,8 +366,9 @@ def fit_surface(sample: Sample, sheets: bool, before: Surface | None = None, cha
     Surface
     """
     nearest = sample.nearest
-    if not sheets:
+    if sample.decisions.whole:
         check_surface(nearest.quadrics.roundness)
+    if not sheets:
         return Surface(sample, nearest.quadrics)
     fitted = fit_sheets(nearest, before.sheets if before else None, changed)
     return Surface(replace(sample, nearest=fitted.nearest), fitted.quadrics, fitted)
@@ -345,34 +387,38 @@ def remove_noise(surface: Surface, options: LaplacianOptions) -> Surface:
     if options.projection == "off":
         return surface
     near = near_misfit(surface.sample.nearest)
-    noise = _noise(surface, near)
+    noise = measure_noise(surface, near)
     if options.projection != "auto":
         return _project(surface, noise, np.ones(len(noise), dtype=bool))[0]
-    noisy = noise > 0.0
-    if noisy.mean() < MANY:
+    noisy, decisions, rounds = noise > 0.0, surface.sample.decisions, 0
+    if not decisions.settle("noisy", lambda: bool(noisy.mean() >= MANY)):
         return surface
     first, filling = np.where(noisy, noise, 0.0), noise > FILLING
-    before = _roughly(surface, noise, filling)
+    before = _roughly(surface, noise, filling, rounds)
     while noisy.any():
         surface, changed = _project(surface, np.where(filling, first, noise), noisy)
         rows = np.flatnonzero(changed)
         near[rows] = near_misfit(surface.sample.nearest, rows)
-        noise = _noise(surface, near)
-        left = _roughly(surface, noise, filling)
+        noise = measure_noise(surface, near)
+        rounds += 1
+        left = _roughly(surface, noise, filling, rounds)
         # What does not fall so fast is no noise, such as leaves.
         noisy &= (left > LEFT) & (left < FALLING * before)
         before = left
     return replace(surface, sample=replace(surface.sample, noise=first))
 
 
-def _noise(surface: Surface, near: Floats) -> Floats:
+def measure_noise(surface: Surface, near: Floats) -> Floats:
+    """Return the noise of all points, (m,), by what quadrics through 20 neighbours miss these by: `noise_level`."""
     return noise_level(surface.sample.nearest, near, surface.mixed.misfit, surface.quadrics.misfit)
 
 
-def _roughly(surface: Surface, noise: Floats, filling: Bools) -> Floats:
+def _roughly(surface: Surface, noise: Floats, filling: Bools, rounds: int) -> Floats:
     """Return the noise, (m,), and for points that fill volumes, all alike, what quadrics miss their neighbors by."""
-    missed = surface.quadrics.misfit[filling] / surface.sample.nearest.spacing[filling]
-    return np.where(filling, np.median(missed) if len(missed) else 0.0, noise)
+    sample = surface.sample
+    missed = surface.quadrics.misfit[filling] / sample.nearest.spacing[filling]
+    usual = sample.decisions.settle_round("filling", rounds, lambda: float(np.median(missed)) if len(missed) else 0.0)
+    return np.where(filling, usual, noise)
 
 
 def _project(surface: Surface, noise: Floats, moving: Bools) -> tuple[Surface, Bools]:
@@ -385,8 +431,9 @@ def _project(surface: Surface, noise: Floats, moving: Bools) -> tuple[Surface, B
         Points that have moved, or have neighbours that did.
     """
     sample, nearest = surface.sample, surface.sample.nearest
+    smallest = sample.decisions.settle("smallest", lambda: int(np.bincount(sample.component).min()))
     points, rows = nearest.points.copy(), np.flatnonzero(moving)
-    points[rows] = project_points(nearest.tree, rows, noise, sample.component)
+    points[rows] = project_points(nearest.tree, rows, noise, smallest)
     changed = moving | moving[nearest.index].any(axis=1)
     nearest = nearest.with_quadrics(surface.mixed).renewed(points, changed)
     moved = replace(sample, nearest=look_across_rows(nearest))
@@ -407,7 +454,11 @@ def divide_sheets(surface: Surface, needed: int) -> Surface:
         Too few points are left.
     """
     sample, fitted = surface.sample, surface.sheets
-    sheets = label_sheets(sample.nearest, surface.quadrics.normals, sample.component)
+    sheets = sample.decisions.label(
+        "sheet",
+        sample.scaled,
+        lambda: label_sheets(sample.nearest, surface.quadrics.normals, sample.component),
+    )
     whole = replace(sample, nearest=sample.nearest.with_quadrics(surface.mixed))
     divided = _regroup(whole, sheets, needed)
     if divided is whole or fitted is None:
@@ -432,7 +483,14 @@ def _regroup(sample: Sample, component: Ints, needed: int) -> Sample:
     scaled, changed, moved = sample.scaled.leave_out(~kept), sample.nearest.across(component), sample.moved[kept]
     component = component[kept]
     nearest = look_across_rows(sample.nearest.renewed(move_apart(scaled.points, component) + moved, changed, kept))
-    return Sample(scaled, component, nearest, sample.noise[kept], sample.scatter[:, kept])
+    return replace(
+        sample,
+        scaled=scaled,
+        component=component,
+        nearest=nearest,
+        noise=sample.noise[kept],
+        scatter=sample.scatter[:, kept],
+    )
 
 
 def locate_boundary(

@@ -16,27 +16,50 @@ def even_reach(nearest: Nearest) -> Floats:
     return reach
 
 
-def label_components(nearest: Nearest) -> Ints:
+def gap_reach(nearest: Nearest) -> Floats:
+    """Return the edge that is a gap, (m,), by the distance of the nearest eight, or in rows by how many there are."""
+    reach = _GAP * nearest.distance[:, 1 : NEXT + 1][:, -1]  # of eight points there are seven neighbors
+    return np.where(nearest.in_row, even_reach(nearest), reach)
+
+
+def label_components(nearest: Nearest, usual: float | None = None) -> Ints:
     """Number the components of the cloud, which gaps separate.
 
     Points are joined to their forty neighbours, as points may crowd along lines, except over gaps far wider than the
     spacing at the nearer end; components of some size are joined over gaps that are no wider than the spacing of the
     sparser one would let expect.
 
+    Parameters
+    ----------
+    nearest : Nearest
+        Of m points.
+    usual : float, optional
+        The median of `gap_reach`, if these are not all the points.
+
     Returns
     -------
     ndarray, (m,) int
         The largest component is 0. Those of fewer points than a neighbourhood has, 41, which get no operator, are -1.
     """
-    index, distance = nearest.index[:, 1:], nearest.distance[:, 1:]
-    reach = _GAP * distance[:, :NEXT][:, -1]  # of eight points there are seven neighbors
-    reach = np.where(nearest.in_row, even_reach(nearest), reach)
-    strict = distance <= np.maximum(np.minimum(reach[:, None], reach[index]), np.median(reach))
-    close = number_by_size(label_connected(index, strict), COUNT)
-    large = close >= 0
-    loose = large[:, None] & large[index] & (distance <= np.maximum(reach[:, None], reach[index]))
-    result = np.full(len(close), -1)
-    result[large] = number_by_size(label_connected(index, strict | loose)[large], COUNT)
+    index = nearest.index[:, 1:]
+    usual = float(np.median(gap_reach(nearest))) if usual is None else usual
+    strict, loose = find_gaps(nearest, usual)
+    large = number_by_size(label_connected(index, strict), COUNT) >= 0
+    loose &= large[:, None] & large[index]
+    return number_large(label_connected(index, strict | loose), large)
+
+
+def find_gaps(nearest: Nearest, usual: float) -> tuple[Bools, Bools]:
+    """Tell which edges to neighbours, (m, 40) bool, are no gaps, and which are none between components of some size."""
+    index, distance, reach = nearest.index[:, 1:], nearest.distance[:, 1:], gap_reach(nearest)
+    strict = distance <= np.maximum(np.minimum(reach[:, None], reach[index]), usual)
+    return strict, distance <= np.maximum(reach[:, None], reach[index])
+
+
+def number_large(label: Ints, large: Bools) -> Ints:
+    """Number components of points, the largest 0; those not among the large ones, or in a small component, are -1."""
+    result = np.full(len(label), -1)
+    result[large] = number_by_size(label[large], COUNT)
     return result
 
 

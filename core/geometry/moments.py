@@ -144,7 +144,9 @@ def _solve(terms: Floats, weights: Floats) -> Floats:
         products = [weighted * term for term in terms]
         missing = -np.array([product.sum(axis=1) for product in products])
         missing[0] += 1.0
-        result[rows] = np.minimum(result[rows], np.linalg.norm(missing, axis=0))
+        # Once met it stays, however long others in the block take: results must not depend on who these are.
+        known = result[rows]
+        result[rows] = np.where(known > MET, np.minimum(known, np.linalg.norm(missing, axis=0)), known)
         open_ = result[rows] > MET
         if step == _STEPS or not open_.any():
             break

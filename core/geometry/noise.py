@@ -71,7 +71,7 @@ def noise_level(nearest: Nearest, near: Floats, mixed: Floats, misfit: Floats) -
     return np.where(nearest.averaging() @ noisy.astype(float) > 0.5, few, 0.0)
 
 
-def project_points(tree: cKDTree, rows: Ints, noise: Floats, component: Ints | None = None) -> Floats:
+def project_points(tree: cKDTree, rows: Ints, noise: Floats, smallest: int | None = None) -> Floats:
     """Move some points onto quadrics through their neighbours.
 
     Parameters
@@ -82,14 +82,14 @@ def project_points(tree: cKDTree, rows: Ints, noise: Floats, component: Ints | N
         Which points to move.
     noise : ndarray, (m,)
         As a share of the spacing: little noise needs few neighbours.
-    component : ndarray, (m,) int, optional
-        Component of each point.
+    smallest : int, optional
+        Points of the smallest component; there is one if not given.
 
     Returns
     -------
     ndarray, (k, 3)
     """
-    smallest = tree.n if component is None else np.bincount(component).min()
+    smallest = tree.n if smallest is None else min(smallest, tree.n)
     # A quadric has six coefficients.
     asked = np.clip(6.0 * (noise[rows] / LEFT) ** 2, ENOUGH, _LARGEST)
     many = np.minimum(asked.astype(int), smallest - 1)

@@ -14,7 +14,7 @@ SCATTERS = 3.0  # standard deviations of the witness' own neighbours more than t
 _BLOCK = 1 << 13  # points looked at at one time
 
 
-def find_outliers(nearest: Nearest) -> Bools:
+def find_outliers(nearest: Nearest, usual: float | None = None) -> Bools:
     """Find points that lie off the surfaces of nearly all of their neighbours.
 
     Twelve neighbours are the witnesses of a point. Each of them describes the surface by a quadric through its own
@@ -27,15 +27,18 @@ def find_outliers(nearest: Nearest) -> Bools:
     ----------
     nearest : Nearest
         Of m points.
+    usual : float, optional
+        Spacing around most points; the median of these if not given.
 
     Returns
     -------
     ndarray, (m,) bool
     """
+    usual = float(np.median(nearest.spacing)) if usual is None else usual
     surface, result = nearest.quadrics, np.zeros(len(nearest.points), dtype=bool)
     alone = Alone(nearest, surface)
     # The first search finds most outliers, each further one those that they had hidden.
-    while (new := _off_surface(nearest, surface, alone, result) & ~result).any():
+    while (new := _off_surface(nearest, surface, alone, result, usual) & ~result).any():
         result |= new
         # The quadrics around them go on without them.
         rows = np.flatnonzero(new[nearest.index].any(axis=1))
@@ -64,11 +67,11 @@ class Alone:
         self._known[rows] = True
 
 
-def _off_surface(nearest: Nearest, surface: Quadrics, alone: Alone, known: Bools) -> Bools:
+def _off_surface(nearest: Nearest, surface: Quadrics, alone: Alone, known: Bools, usual: float) -> Bools:
     """Tell which points lie off the surface, those that are known to among them, (m,) bool."""
     spacing, result = nearest.spacing, known.copy()
     off = third_least(heights_over_witnesses(nearest, surface, np.arange(len(spacing))))
-    sparse = spacing > GAP * np.median(spacing)  # their witnesses must show a surface that thin
+    sparse = spacing > GAP * usual  # their witnesses must show a surface that thin
     suspects = np.flatnonzero(~known & ((off > ON * spacing) | (sparse & (surface.misfit > ON * spacing))))
     if not len(suspects):
         return result

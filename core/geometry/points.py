@@ -13,6 +13,7 @@ from ..arguments import Shape, as_array, as_doubles, check_array, check_finite
 from ..cores import cores
 from ..errors import InvalidPointsError, NotASurfaceError, TooFewPointsError
 from ..types import Array, Bools, Floats, Ints
+from .agreed import Decisions
 
 FEWEST = 5  # points of a boundary that is given
 _SAME = 1e-9  # of the scale: closer points count as one, as areas between them would drown in rounding
@@ -119,7 +120,7 @@ class ScaledPoints:
         return replace(self, inverse=inverse, first=rows[self.first])
 
 
-def scale_points(points: Floats, needed: int) -> ScaledPoints:
+def scale_points(points: Floats, needed: int, decisions: Decisions | None = None) -> ScaledPoints:
     """Centre, scale and merge duplicates, so that all that follows is free of units.
 
     Parameters
@@ -128,16 +129,19 @@ def scale_points(points: Floats, needed: int) -> ScaledPoints:
         From `check_points`.
     needed : int
         How many distinct points the neighbourhoods need.
+    decisions : Decisions, optional
+        Of the center and the scale.
 
     Raises
     ------
     TooFewPointsError, NotASurfaceError
         Fewer distinct points than needed, or all of them on one line.
     """
-    # Sums over sorted numbers, so that rounding, and all that hangs on it, is the same in any order of the points.
-    columns = np.sort(np.ascontiguousarray(points.T))
-    centered = np.subtract(points, columns.mean(axis=1), order="C")
-    scale = float(np.sqrt(np.mean(np.sort(np.sum(centered**2, axis=1)))))
+    decisions = decisions or Decisions()
+    # Means over sorted numbers, so that rounding, and all that hangs on it, is the same in any order of the points.
+    center = decisions.settle("center", lambda: np.sort(np.ascontiguousarray(points.T)).mean(axis=1))
+    centered = np.subtract(points, center, order="C")
+    scale = decisions.settle("scale", lambda: float(np.sqrt(np.mean(np.sort(np.sum(centered**2, axis=1))))))
     if scale > 0.0:
         centered /= scale
     distinct, first, inverse = _merge(centered)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -17,7 +18,7 @@ from .distances import pair_heights
 from .nearest import COUNT, FEW, NEXT, ON, SMOOTH, Nearest
 from .pairs import Pairs
 from .patches import Patch
-from .quadrics import Quadrics, check_surface, fit_quadrics, frames
+from .quadrics import Quadrics, fit_quadrics, frames
 
 _LEANING = 0.1  # what normals may be off by, as a share of the distance
 _SEEDS = 9  # nearest neighbours, every two of which make such a plane
@@ -131,7 +132,6 @@ def fit_sheets(nearest: Nearest, before: Sheets | None = None, changed: Bools | 
     if before is None or changed is None:
         changed = np.ones(len(points), dtype=bool)
     mixed = nearest.quadrics
-    check_surface(mixed.roundness)
     spacing = nearest.spacing
     missed = mixed.misfit > ON * spacing
     planes = mixed.normals.copy()
@@ -198,6 +198,11 @@ def label_sheets(nearest: Nearest, normals: Floats, component: Ints) -> Ints:
         The largest component is 0; points off the surface are -1.
     """
     sheet = number_by_size(label_connected(nearest.index, sheet_neighbors(nearest, normals, False)), COUNT)
+    return number_sheets(join_touching(nearest, sheet), component)
+
+
+def join_touching(nearest: Nearest, sheet: Ints) -> Ints:
+    """Return the sheets of points, (m,), those on small ones, -1 before, with the sheet that they touch."""
     # Few points, such as sharp tips, are joined to the sheet that they touch; what touches none lies off the surface.
     touching = nearest.distance <= _AROUND * nearest.spacing[nearest.index]
     lost = np.flatnonzero(sheet < 0)
@@ -207,6 +212,11 @@ def label_sheets(nearest: Nearest, normals: Floats, component: Ints) -> Ints:
         if len(left) == len(lost):
             break
         lost = left
+    return sheet
+
+
+def number_sheets(sheet: Ints, component: Ints) -> Ints:
+    """Number sheets within components, the largest 0; points on no sheet are -1."""
     result = np.full(len(sheet), -1)
     known = sheet >= 0
     result[known] = number_by_size(sheet[known] + (sheet.max() + 1) * component[known], smallest=0)
@@ -243,7 +253,13 @@ def sheet_neighbors(nearest: Nearest, normals: Floats, oriented: bool) -> Bools:
     return result
 
 
-def separate_sheets(pairs: Pairs, nearest: Nearest, oriented: Floats, sides: Floats) -> Pairs:
+def separate_sheets(
+    pairs: Pairs,
+    nearest: Nearest,
+    oriented: Floats,
+    sides: Floats,
+    settle: Callable[[Callable[[], Ints]], Ints] = lambda find: find(),
+) -> Pairs:
     """Leave out the pairs whose ends lie on different sheets, which face each other across a gap.
 
     Normals decide it for most pairs. Where they leave a doubt, two points lie on one sheet if a path of short steps
@@ -262,6 +278,8 @@ def separate_sheets(pairs: Pairs, nearest: Nearest, oriented: Floats, sides: Flo
         Those of the smooth side that each point lies on, between edges, by which the steps go: next to an edge or in
         the mouth of a narrow slot the others are a mean of both sides, which leads across. For whole pairs that mean is
         right: by the normals of sides all pairs over edges would be in doubt, where steps are long detours.
+    settle : callable
+        See `step_lengths`.
 
     Returns
     -------
@@ -273,7 +291,7 @@ def separate_sheets(pairs: Pairs, nearest: Nearest, oriented: Floats, sides: Flo
         return pairs
     first, second = pairs.first[doubtful], pairs.second[doubtful]
     longest = _AROUND * pairs.distance[doubtful]
-    apart = ways_along(step_lengths(nearest, sides), nearest.tree, first, second, longest) > longest
+    apart = ways_along(step_lengths(nearest, sides, settle), nearest.tree, first, second, longest) > longest
     kept = np.ones(len(pairs.first), dtype=bool)
     kept[doubtful[apart]] = False
     left = np.bincount(np.append(pairs.first[kept], pairs.second[kept]), minlength=len(sides))
@@ -296,7 +314,9 @@ def _plainly_on_one_sheet(pairs: Pairs, oriented: Floats, spacing: Floats) -> Bo
     return result
 
 
-def step_lengths(nearest: Nearest, oriented: Floats) -> sparse.csr_array:
+def step_lengths(
+    nearest: Nearest, oriented: Floats, settle: Callable[[Callable[[], Ints]], Ints] = lambda find: find()
+) -> sparse.csr_array:
     """Return the lengths of the steps along sheets between next neighbours.
 
     Sharp folds, whose normals join them to nothing, are joined to what is nearest to them.
@@ -307,6 +327,8 @@ def step_lengths(nearest: Nearest, oriented: Floats) -> sparse.csr_array:
         Of m points.
     oriented : ndarray, (m, 3)
         Unit normals whose signs agree.
+    settle : callable
+        Takes `find_bridges` without arguments, and returns what it finds, or others that are agreed on.
 
     Returns
     -------
@@ -317,21 +339,35 @@ def step_lengths(nearest: Nearest, oriented: Floats) -> sparse.csr_array:
     count = len(next_to)
     first = np.repeat(np.arange(count, dtype=np.int32), np.count_nonzero(next_to, axis=1))
     second, length = nearest.index[next_to], nearest.distance[next_to]
-    label = connected_components(sparse.csr_array((length, (first, second)), shape=(count, count)), directed=False)[1]
-    row, column = np.nonzero(label[nearest.index] != label[:, None])
-    if len(row):
-        other, gap = nearest.index[row, column], nearest.distance[row, column]
-        low, high = np.sort([label[row], label[other]], axis=0)
-        order = np.lexsort((gap, high, low))
-        shortest = order[np.append(True, np.diff(low[order]) | np.diff(high[order]) != 0)]
-        low, high, row, other, gap = (values[shortest] for values in (low, high, row, other, gap))
-        shape = (label.max() + 1,) * 2
-        bridge = minimum_spanning_tree(sparse.csr_array((gap, (low, high)), shape=shape)).tocoo()
-        chosen = np.isin(low.astype(np.int64) * shape[0] + high, bridge.row.astype(np.int64) * shape[0] + bridge.col)
-        first = np.append(first, row[chosen]).astype(np.int32)
-        second, length = np.append(second, other[chosen]), np.append(length, gap[chosen])
     steps = sparse.csr_array((length, (first, second)), shape=(count, count))
+    row, other = settle(lambda: find_bridges(nearest, connected_components(steps, directed=False)[1])).T
+    if len(row):
+        column = (nearest.index[row] == other[:, None]).argmax(axis=1)
+        ends = np.append(first, row).astype(np.int32), np.append(second, other)
+        steps = sparse.csr_array((np.append(length, nearest.distance[row, column]), ends), shape=(count, count))
     return steps.maximum(steps.T).tocsr()
+
+
+def find_bridges(nearest: Nearest, label: Ints) -> Ints:
+    """Return the shortest edges between neighbours that join points of different labels, (m,): (k, 2) int."""
+    row, column = np.nonzero(label[nearest.index] != label[:, None])
+    other, gap = nearest.index[row, column], nearest.distance[row, column]
+    return np.column_stack([row, other])[choose_bridges(label[row], label[other], gap)]
+
+
+def choose_bridges(left: Ints, right: Ints, gap: Floats) -> Ints:
+    """Return which edges join all labels with the least gaps, (k,) int, by the labels of their ends."""
+    if not len(gap):
+        return np.zeros(0, dtype=np.int64)
+    low, high = np.sort([left, right], axis=0)
+    order = np.lexsort((gap, high, low))
+    shortest = order[np.append(True, np.diff(low[order]) | np.diff(high[order]) != 0)]
+    low, high, gap = (values[shortest] for values in (low, high, gap))
+    shape = (high.max() + 1,) * 2
+    bridge = minimum_spanning_tree(sparse.csr_array((gap, (low, high)), shape=shape)).tocoo()
+    chosen = np.isin(low.astype(np.int64) * shape[0] + high, bridge.row.astype(np.int64) * shape[0] + bridge.col)
+    chosen_edges: Ints = shortest[chosen]
+    return chosen_edges
 
 
 def ways_along(steps: sparse.csr_array, tree: cKDTree, first: Ints, second: Ints, longest: Floats) -> Floats:

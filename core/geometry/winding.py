@@ -44,11 +44,20 @@ def orient_by_winding(nearest: Nearest, normals: Floats, place: Floats, part: In
     ndarray, (m, 3)
         The same normals with consistent signs, each component as `outer_signs` has it.
     """
+    normals, _ = orient_patches(nearest, normals, place)
+    return normals * outer_signs(place, normals, part)[part, None]
+
+
+def orient_patches(nearest: Nearest, normals: Floats, place: Floats) -> tuple[Floats, Ints]:
+    """Flip normals so that all patches agree, on either side; return them, (m, 3), and the patch of each, (m,) int.
+
+    Within a patch signs are beyond doubt.
+    """
     normals, tree = propagate_signs(nearest, normals)
     patch = divide_patches(nearest.points, normals, tree)
     if patch.max() > 0:
         normals = normals * _least(_patch_energies(place, normals, nearest.spacing**2, patch))[patch][:, None]
-    return normals * outer_signs(place, normals, part)[part, None]
+    return normals, patch
 
 
 def divide_patches(points: Floats, normals: Floats, tree: sparse.csr_array) -> Ints:

@@ -1,6 +1,6 @@
 """The Laplace-Beltrami operator on a cloud: areas, weights, stiffness, spectrum, curvature."""
 
-from .areas import KernelMatrix, estimate_areas
+from .areas import KernelMatrix, estimate_areas, solve_areas
 from .connection import connection_laplacian, tangent_frames
 from .curvature import PrincipalCurvatures, mean_curvature, principal_curvatures
 from .implicit import Heights, ImplicitSurface

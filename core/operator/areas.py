@@ -96,7 +96,8 @@ def solve_areas(cloud: Cloud, distance: Floats, report: Report = lambda: None) -
     lengths = cloud.pairs.lengths
     matrix = KernelMatrix(cloud.pairs, distance, cloud.boundary, report)
     target = kernel_integral(lengths, cloud.gaussian_curvature) + _gain(matrix, lengths)
-    return _like_cells(matrix, fast_areas(matrix, target, cloud.cell_areas), cloud)
+    degree = cloud.decisions.settle("degree", lambda: _DEGREE)
+    return _like_cells(matrix, fast_areas(matrix, target, cloud.cell_areas, degree), cloud)
 
 
 def _like_cells(matrix: KernelMatrix, areas: Floats, cloud: Cloud) -> Floats:
@@ -112,7 +113,8 @@ def _like_cells(matrix: KernelMatrix, areas: Floats, cloud: Cloud) -> Floats:
         ratio = mean * (matrix @ (areas * ratio))
     areas = areas * ratio
     total, found = (np.bincount(cloud.component, values) for values in (cloud.cell_areas, areas))
-    return areas * (total / found)[cloud.component]
+    last = cloud.decisions.settle("ratio", lambda: total / found)
+    return areas * last[cloud.decisions.names(cloud.scaled, cloud.component)]
 
 
 def _gain(matrix: KernelMatrix, lengths: Floats) -> Floats:
@@ -163,7 +165,7 @@ class KernelMatrix:
         return self._diagonal * values + first + second
 
 
-def fast_areas(matrix: KernelMatrix, target: Floats, cells: Floats) -> Floats:
+def fast_areas(matrix: KernelMatrix, target: Floats, cells: Floats, degree: int = _DEGREE) -> Floats:
     """Solve A v = b by two projected rounds of polynomials in A, from the areas c of the Voronoi cells.
 
     M = V0^(1/2) A V0^(1/2) with v0 = c / (A c) has its eigenvalues in [-1, 1]; but for pairs left out between close
@@ -182,6 +184,8 @@ def fast_areas(matrix: KernelMatrix, target: Floats, cells: Floats) -> Floats:
         b, the integral that the kernel should have at each point (1 on a flat surface).
     cells : ndarray, (n,)
         Areas of the Voronoi cells.
+    degree : int
+        Of the polynomial of the first round; that of the second has half of it.
 
     Returns
     -------
@@ -192,11 +196,11 @@ def fast_areas(matrix: KernelMatrix, target: Floats, cells: Floats) -> Floats:
     right, y = root * target, cells / root
     floor = _FLOOR * y
     held = np.zeros(len(target), dtype=bool)
-    for degree in (_DEGREE, _DEGREE // 2):
+    for many in (degree, degree // 2):
         residual = right - root * (matrix @ (root * y))
         held &= residual < 0.0
         residual[held] = 0.0
-        y = np.maximum(y + _polynomial(matrix, root, residual, held, _inverse(degree)), floor)
+        y = np.maximum(y + _polynomial(matrix, root, residual, held, _inverse(many)), floor)
         held = y <= floor
     return root * y
 

@@ -11,7 +11,7 @@ from scipy import sparse
 
 from ..arguments import check_switches
 from ..errors import InvalidPointsError
-from ..geometry import Doubt, arc_length, check_points, check_values, move_apart, read_cloud, toward
+from ..geometry import Agreed, Doubt, arc_length, check_points, check_values, move_apart, read_cloud, toward
 from ..kernel import SECOND_MOMENT
 from ..memory import check_memory
 from ..options import LaplacianOptions, check_options
@@ -78,6 +78,8 @@ class LaplaceBeltrami:
         Weights of the mirror images in the boundary that `stiffness` holds; symmetric, not negative.
     options : LaplacianOptions
         The settings it was built with.
+    agreed : Agreed
+        What was decided for the cloud as a whole.
     notices : list of str
         Texts for the user: merged duplicates, points left out, noise, a solver that stopped early.
     """
@@ -101,6 +103,7 @@ class LaplaceBeltrami:
     stiffness: sparse.csr_array
     images: sparse.csr_array
     options: LaplacianOptions
+    agreed: Agreed
     notices: list[str]
 
     @property
@@ -318,6 +321,7 @@ def build_laplacian(
     boundary: ArrayLike | None = None,
     boundary_distance: ArrayLike | None = None,
     left_out: ArrayLike = (),
+    agreed: Agreed | None = None,
     progress: Progress | None = None,
 ) -> LaplaceBeltrami:
     """Build the operator from a point cloud.
@@ -337,6 +341,8 @@ def build_laplacian(
         far. With `boundary`, distances next to corners, where there are two boundaries, are measured nevertheless.
     left_out : array_like, (k,) int or (n,) bool, optional
         Points to leave out, such as `floaters`: on the others the operator is that of them alone.
+    agreed : Agreed, optional
+        What was decided for a cloud that these points are all of, or a part of with a halo around; see `Agreed`.
     progress : callable, optional
         Called as ``progress(stage, fraction)`` in each stage; may raise `Cancelled`.
 
@@ -382,7 +388,7 @@ def build_laplacian(
     checked = check_points(points)
     check_memory(len(checked), options)
 
-    cloud = read_cloud(checked, options, normals, boundary, boundary_distance, report, left_out)
+    cloud = read_cloud(checked, options, normals, boundary, boundary_distance, report, left_out, agreed)
     report("Areas", 0.5)
     distance = arc_length(cloud)
     areas = solve_areas(cloud, distance, lambda: report("Areas", 0.6))
@@ -451,6 +457,7 @@ def laplacian_of(
         stiffness=assembled.matrix,
         images=assembled.images,
         options=options,
+        agreed=cloud.decisions.made,
         notices=notices,
     )
 

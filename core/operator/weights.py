@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -78,18 +79,21 @@ def balance_weights(
     moments = _Moments(cloud, distance, weights, 4.0 * areas * _trace(cloud, weights, areas) / lengths**2, report)
     goal = np.zeros((len(areas), TERMS))
     goal[:, 0] = 1.0
-    terms = np.zeros_like(goal)
+    terms, decisions = np.zeros_like(goal), cloud.decisions
+    last = decisions.rounds("shares")
     for step in range(_ROUNDS + 1):
         missing = goal - moments.of(terms)
         residual = np.linalg.norm(missing, axis=1)
-        if step == _ROUNDS or np.sqrt(np.mean((residual / lengths) ** 2)) < MET:  # what a first moment makes of a slope
+        off = np.sqrt(np.mean((residual / lengths) ** 2))  # what a first moment makes of a slope
+        if step == _ROUNDS or (off < MET if last is None else step == last):
             break
         if step <= _ROUNDS // 2 and (step + 2).bit_count() == 1:  # the Hessian, each time for twice as many rounds
             inverse = inverses(moments.curvature(terms) + MET * np.eye(TERMS))
             acceleration = Anderson(_SMALLEST)
         change = np.einsum("iab,ib->ia", inverse, missing - MET * terms)
         change /= np.maximum(np.linalg.norm(change, axis=1, keepdims=True), 1.0)
-        terms = acceleration.extrapolate(terms, terms + change)
+        settle = functools.partial(decisions.settle_round, "shares", step)
+        terms = acceleration.extrapolate(terms, terms + change, settle)
     return Balance(moments.factor(terms), residual)
 
 

@@ -119,7 +119,7 @@ class TestBalancedWeights:
 
     def test_of_points_without_pairs_are_none(self, monkeypatch):
         monkeypatch.setattr(
-            "core.geometry.cloud.find_outliers", lambda nearest: np.zeros(len(nearest.points), dtype=bool)
+            "core.geometry.cloud.find_outliers", lambda nearest, usual: np.zeros(len(nearest.points), dtype=bool)
         )
         lone = np.random.default_rng(0).uniform(-1.4, 1.4, (100, 3))
         laplacian = core.build_laplacian(np.concatenate([random_sphere(1000), lone]))

@@ -1,0 +1,103 @@
+"""Tiles of a cloud: boxes of about as many points each, and a halo around them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arguments import real, whole
+from ..errors import InvalidPointsError
+from ..geometry import check_points, find_nearest
+from ..types import Bools, Floats, Ints
+
+HALO = 60.0  # spacings, at which all results of a tile are those of the whole cloud to 1e-6, see docs/tiles.md
+
+
+@dataclass(frozen=True, eq=False)
+class Tile:
+    """A box of a cloud, and a halo around it.
+
+    Attributes
+    ----------
+    rows : ndarray, (k,) int
+        Which of the cloud's points, ascending.
+    inner : ndarray, (k,) bool
+        Which of these lie in the box; each point lies in that of one tile.
+    close : ndarray, (k,) bool
+        Which lie in the box or in the nearer half of the halo: the far end tells less, as its neighbours are missing.
+    """
+
+    rows: Ints
+    inner: Bools
+    close: Bools
+
+    @property
+    def own(self) -> Ints:
+        """The rows of the points in the box."""
+        return self.rows[self.inner]
+
+
+def cut(points: ArrayLike, count: int, halo: float = HALO) -> list[Tile]:
+    """Cut a cloud into tiles by planes at medians, each across the longest side.
+
+    Parameters
+    ----------
+    points : array_like, (n, 3)
+        Coordinates [L].
+    count : int
+        How many tiles.
+    halo : float
+        Width of the halos, in spacings of the points in them, and at least of those in the box.
+
+    Returns
+    -------
+    list of Tile
+        Points at one place lie in one tile.
+
+    Raises
+    ------
+    InvalidPointsError
+        Points of a wrong shape or not finite, fewer points than tiles, or a halo that is negative.
+
+    Examples
+    --------
+    >>> import core
+    >>> points = core.example_sphere()
+    >>> print([len(tile.own) for tile in core.tiles.cut(points, 4)])
+    [200, 200, 200, 200]
+    """
+    points = check_points(points)
+    if not 1 <= whole(count) <= len(points):
+        raise InvalidPointsError(
+            f"{count!r} tiles of {len(points)} points. Ask for at least one, and fewer than points."
+        )
+    if not real(halo) >= 0.0:
+        raise InvalidPointsError(f"A halo of {halo!r} spacings. Use a number that is not negative.")
+    spacing = find_nearest(points).spacing
+    return [_with_halo(points, spacing, own, halo) for own in _divided(points, np.arange(len(points)), int(count))]
+
+
+def _divided(points: Floats, rows: Ints, count: int) -> list[Ints]:
+    """Divide some of the points, by their rows, into so many boxes; fewer where points are at one place."""
+    if count == 1 or len(rows) < 2:
+        return [rows]
+    values = points[rows, np.ptp(points[rows], axis=0).argmax()]
+    left = count // 2
+    level = np.partition(values, left * len(rows) // count)[left * len(rows) // count]
+    below = values < level
+    if not below.any():
+        return [rows]
+    return _divided(points, rows[below], left) + _divided(points, rows[~below], count - left)
+
+
+def _with_halo(points: Floats, spacing: Floats, own: Ints, halo: float) -> Tile:
+    low, high = points[own].min(axis=0), points[own].max(axis=0)
+    outside = np.linalg.norm(np.maximum(np.maximum(low - points, points - high), 0.0), axis=1)
+    away = outside / np.maximum(spacing, np.median(spacing[own]))  # in spacings
+    away[own] = 0.0
+    inner = np.zeros(len(points), dtype=bool)
+    inner[own] = True
+    rows = np.flatnonzero(away <= halo)
+    return Tile(rows, inner[rows], away[rows] <= 0.5 * halo)

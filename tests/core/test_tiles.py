@@ -1,0 +1,194 @@
+"""Tiles of a cloud: each measured as it is within the whole, however the cloud is cut."""
+
+from dataclasses import fields
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+import core
+from core.geometry import Agreed, find_nearest
+from core.geometry.boundary import no_boundary
+from core.geometry.moments import least_error
+from core.tiles.labels import agree_on_signs, merge_links
+
+COUNT = 4000
+LENGTH, RADIUS = 12.0, 0.125  # of rods so long that tiles with halos are two thirds of them
+SPACING = np.sqrt(2.0 * np.pi * RADIUS * LENGTH / COUNT)
+LOW = Agreed(degree=12)  # reaches less far than the halos of these few points
+HALO = 45.0
+KINDS = ("noisy", "several")
+
+
+def rod(count, length, rng):
+    """Return random points of a rod with round ends, (count, 3)."""
+    points = rng.normal(size=(count, 3))
+    cap = rng.random(count) < 2.0 * RADIUS / (length + 2.0 * RADIUS)
+    points[~cap, 0] = 0.0
+    points *= RADIUS / np.linalg.norm(points, axis=1)[:, None]
+    points[:, 0] += np.where(cap, np.sign(points[:, 0]) * 0.5, rng.uniform(-0.5, 0.5, count)) * length
+    return points
+
+
+@cache
+def rods(kind):
+    """Return points of a rod, with noise, or with a short one, an outlier, and points at one place."""
+    rng = np.random.default_rng(0)
+    points = rod(COUNT, LENGTH, rng)
+    if kind == "noisy":
+        points = points + 0.15 * SPACING * rng.normal(size=points.shape)
+    if kind == "several":
+        short = rod(COUNT // 4, LENGTH / 4, rng) + [0.5, 1.0, 0.0]
+        points = np.concatenate([points, short, points[:9], [[0.0, 0.0, 1.0]]])
+    return points
+
+
+@cache
+def whole(kind):
+    return core.build_laplacian(rods(kind), agreed=LOW)
+
+
+@cache
+def tiles(kind):
+    return core.tiles.cut(rods(kind), 4, HALO)
+
+
+@cache
+def surveyed(kind):
+    return core.tiles.survey(rods(kind), tiles(kind), degree=LOW.degree)
+
+
+def joined(points, parts, agreed):
+    found = [core.tiles.measure_tile(points, tile, agreed) for tile in parts]
+    order = np.argsort(np.concatenate([part.rows for part in found]))
+    result = {
+        name: np.concatenate([getattr(part, name) for part in found])[order]
+        for name in (quantity.name for quantity in fields(core.tiles.Measured))
+        if name not in ("stiffness", "notices")
+    }
+    return result, sparse.vstack([part.stiffness for part in found]).tocsr()[order]
+
+
+def same(left, right, rtol):
+    np.testing.assert_allclose(left, right, rtol=0.0, atol=rtol * np.abs(right).max())
+
+
+def assert_alike(result, laplacian, rtol):
+    """Assert that joined tiles are the operator."""
+    values, stiffness = result
+    on = laplacian.component >= 0
+    for name in ("normals", "quadric_mean_curvature", "gaussian_curvature", "smoothing_lengths", "areas", "trust"):
+        same(values[name][on], getattr(laplacian, name)[on], rtol)
+    same(values["mean_curvature"][on], core.mean_curvature(laplacian)[on], rtol)
+    assert abs(stiffness - laplacian.stiffness).max() <= rtol * abs(laplacian.stiffness).max()
+    np.testing.assert_array_equal(values["boundary"], laplacian.boundary)
+    np.testing.assert_array_equal(values["component"], laplacian.component)
+    assert abs(values["areas"].sum() / laplacian.areas.sum() - 1.0) < 1e-9
+
+
+class TestAgreed:
+    @pytest.mark.parametrize("kind", KINDS)
+    def test_given_back_makes_the_same_operator_to_the_bit(self, kind):
+        points = rods(kind)[-1400:]
+        first = core.build_laplacian(points)
+        again = core.build_laplacian(points, agreed=first.agreed)
+        for name in ("areas", "normals", "smoothing_lengths", "component", "trust", "shape_operator", "boundary"):
+            np.testing.assert_array_equal(getattr(again, name), getattr(first, name))
+        np.testing.assert_array_equal(again.stiffness.data, first.stiffness.data)
+        assert again.agreed.shares == first.agreed.shares
+        for name in {quantity.name for quantity in fields(Agreed)} - {"shares"}:
+            np.testing.assert_array_equal(getattr(again.agreed, name), getattr(first.agreed, name))
+
+    def test_notes_what_was_decided(self):
+        agreed = whole("several").agreed
+        assert agreed.smallest == COUNT // 4
+        assert agreed.noisy is False
+        assert whole("noisy").agreed.noisy is True
+        assert agreed.component.max() == 1
+        assert agreed.component[-1] == -1
+
+    def test_among_some_points_keeps_the_bridges_within(self):
+        agreed = Agreed(bridges=np.array([[0, 5], [3, 4], [4, 1]]), component=np.arange(6))
+        some = agreed.among(np.array([1, 3, 4]), 6)
+        np.testing.assert_array_equal(some.bridges, [[1, 2], [2, 0]])
+        np.testing.assert_array_equal(some.component, [1, 3, 4])
+
+
+class TestTiles:
+    @pytest.mark.parametrize("kind", KINDS)
+    def test_divide_the_points(self, kind):
+        own = np.concatenate([tile.own for tile in tiles(kind)])
+        np.testing.assert_array_equal(np.sort(own), np.arange(len(rods(kind))))
+        assert max(len(tile.rows) for tile in tiles(kind)) < 0.8 * len(rods(kind))
+
+    def test_hold_points_at_one_place_together(self):
+        points = np.repeat(np.random.default_rng(0).random((50, 3)), 3, axis=0)
+        for tile in core.tiles.cut(points, 4, 0.0):
+            assert set(tile.own // 3) == {row // 3 for row in tile.own if list(tile.own // 3).count(row // 3) == 3}
+
+    def test_are_not_more_than_the_points(self):
+        with pytest.raises(core.InvalidPointsError, match="5 tiles of 4 points"):
+            core.tiles.cut(np.eye(4, 3), 5)
+        with pytest.raises(core.InvalidPointsError, match="halo"):
+            core.tiles.cut(np.eye(4, 3), 2, -1.0)
+
+    @pytest.mark.parametrize("kind", KINDS)
+    def test_are_measured_as_within_the_whole(self, kind):
+        result = joined(rods(kind), tiles(kind), whole(kind).agreed)
+        assert_alike(result, whole(kind), 1e-5 if kind == "noisy" else 1e-6)
+
+
+class TestSurvey:
+    @pytest.mark.parametrize("kind", KINDS)
+    def test_finds_what_the_whole_decides(self, kind):
+        found, known = surveyed(kind), whole(kind).agreed
+        for name in ("center", "scale", "spacing", "reach"):
+            np.testing.assert_allclose(getattr(found, name), getattr(known, name), rtol=1e-12, atol=1e-15)
+        for name in ("component", "sheet", "smallest", "noisy"):
+            np.testing.assert_array_equal(getattr(found, name), getattr(known, name))
+        on = known.sheet >= 0
+        assert np.all(np.einsum("ij,ij->i", found.side, known.side)[on] > 0.0)
+        assert len(found.shares) <= 16
+
+    def test_does_not_depend_on_the_cut(self):
+        points = rods("several")
+        turned = points @ np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+        other = core.tiles.cut(turned, 3, HALO)
+        found, known = core.tiles.survey(points, other, degree=LOW.degree), surveyed("several")
+        np.testing.assert_allclose(found.ratio, known.ratio, rtol=1e-6)
+        same(np.concatenate(found.shares), np.concatenate(known.shares), 1e-6)
+        np.testing.assert_array_equal(found.sheet, known.sheet)
+        first, second = joined(points, other, found), joined(points, tiles("several"), known)
+        assert abs(first[1] - second[1]).max() <= 1e-6 * abs(second[1]).max()
+        for name in ("areas", "mean_curvature", "normals"):
+            same(first[0][name], second[0][name], 1e-6)
+
+
+def test_errors_of_moments_do_not_depend_on_which_points_are_asked_together():
+    points = np.random.default_rng(0).normal(size=(600, 3))
+    points /= np.linalg.norm(points, axis=1)[:, None]
+    areas, lengths = np.full(600, 4.0 * np.pi / 600), np.full(600, 0.2)
+    given = find_nearest(points), points, areas, no_boundary(600), lengths
+    together = least_error(*given, np.arange(600))
+    hard = np.flatnonzero(together > 1e-2)
+    assert 10 < len(hard) < 500
+    for rows in hard, np.flatnonzero(together < 1e-2)[:50]:
+        np.testing.assert_allclose(least_error(*given, rows), together[rows], rtol=1e-3, atol=1e-6)
+
+
+class TestLabels:
+    def test_of_links_are_merged_over_common_points(self):
+        # A chain 0 - 1 - 2 - 3 over two tiles, 4 - 5 in the second, 6 alone.
+        first = np.array([0, 1, 2]), np.array([0, 1]), np.array([1, 2])
+        second = np.array([2, 3, 4, 5, 6]), np.array([0, 2]), np.array([1, 3])
+        label = merge_links([first, second], 8)
+        assert len(set(label[:4])) == 1
+        assert label[4] == label[5]
+        assert len({label[0], label[4], label[6]}) == 3
+        assert label[7] == -1
+
+    def test_of_signs_follow_most_votes(self):
+        # A chain of three patches, the second reversed; one false vote between the ends, and a patch alone.
+        sign = agree_on_signs(np.array([0, 1, 0, 1]), np.array([1, 2, 2, 0]), np.array([-4.0, -7.0, -1.0, -5.0]), 4)
+        np.testing.assert_array_equal(sign, [1.0, -1.0, 1.0, 1.0])
