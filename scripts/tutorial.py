@@ -1,4 +1,4 @@
-"""docs/tutorial.md, played in a window word by word, for its test and its pictures.
+"""docs/tutorial.md, played in a window word by word, for its test and its pictures; rig_tutorial.py plays another one.
 
 Every step quotes its instructions. Instructions that are not played are an error, as are steps that the tutorial does
 not describe; so no key has to be guessed.
@@ -266,13 +266,13 @@ def _choose_standard(gui, setting):
 STEPS = (import_sample, analyze, choose, bend, color, render)
 
 
-def play(gui, keep):
-    """Play all steps; `keep` gets the name of each picture that the tutorial has."""
+def play(gui, keep, page="tutorial.md", steps=STEPS):
+    """Play all steps of a page; `keep` gets the name of each picture that it has."""
     gui.open_panels("MESHFREE_PT_display")  # the one that is open before anybody opens or closes some
     gui.new_file()
     gui.python("bpy.context.preferences.view.filebrowser_display_type = 'SCREEN'")
     (gui.folder / SAMPLE.name).write_bytes(SAMPLE.read_bytes())  # where the file browser opens
-    quote = Reader((ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8"))
-    for step in STEPS:
+    quote = Reader((ROOT / "docs" / page).read_text(encoding="utf-8"))
+    for step in steps:
         step(gui, quote, keep)
     quote.end()

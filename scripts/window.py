@@ -359,7 +359,7 @@ class Window:
                 continue
             for _ in range(2):  # another panel is closed again
                 self.click(x + 0.35 * width, y)
-                for below in (22, 31):
+                for below in (22, 31, 57):  # a line of text may come first
                     self.move(x + 0.65 * width, y + below)
                     if self.python("button_under_mouse()").startswith(_written(first)):
                         return

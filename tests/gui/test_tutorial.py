@@ -1,8 +1,9 @@
-"""docs/tutorial.md, followed word by word by somebody who does nothing else."""
+"""docs/tutorial.md and docs/rig_a_scan.md, followed word by word by somebody who does nothing else."""
 
 import numpy as np
 import pytest
 
+import rig_tutorial
 import tutorial
 
 # Small and plain, for a machine without a graphics card.
@@ -72,3 +73,28 @@ def test_every_step_as_it_is_written(gui):
     tutorial.play(gui, seen)
     assert seen.names == ["import", "colors", "groups", "bent", "display", "result"]
     assert gui.python("coral.data.attributes['lb_displacement'].data[0].vector[:]") == [0.0, 0.0, 0.0]
+
+
+ENDS = "[end for bone in bpy.context.object.data.edit_bones for end in (*bone.head, *bone.tail)]"
+BENT = """
+shown = bpy.data.objects["coral"].evaluated_get(bpy.context.evaluated_depsgraph_get())
+rest = attribute(bpy.data.objects["coral"], "position")
+moved = np.linalg.norm(attribute(shown, "position")[: len(rest)] - rest, axis=1)
+[float(moved[rest[:, 0] < -1.3].min()), float(moved[rest[:, 0] > 0.3].max())]
+"""
+
+
+def test_every_step_of_the_rig_as_it_is_written(gui):
+    names = []
+
+    def keep(name):
+        names.append(name)
+        if name == "bones":
+            assert gui.python(ENDS) == pytest.approx([0, 0, 0, -0.8, 0, -0.4, -0.8, 0, -0.4, -1.8, 0, -0.9], abs=1e-6)
+        elif name == "posed":
+            arm, rest = gui.python(BENT)
+            assert arm > 0.2
+            assert rest < 0.05
+
+    rig_tutorial.play(gui, keep)
+    assert names == ["import", "bones", "posed", "played"]
