@@ -28,6 +28,7 @@ NOT_RUN = {
     "python -m benchmarks.awkward": SLOW,
     "python -m benchmarks.holes": SLOW,
     "python -m benchmarks.orientation": SLOW,
+    "python -m benchmarks.tiles 40000 4 60": SLOW,
     "MESHFREE_ZOO=folder python -m benchmarks.ablation": SLOW,
     "MESHFREE_ZOO=folder python -m benchmarks.alignment": SLOW,
     "MESHFREE_ZOO=folder python -m benchmarks.real_shapes": SLOW,

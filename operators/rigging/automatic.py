@@ -16,10 +16,9 @@ from ..registration import Registration, Row
 from ..running.application import ApplicationOperator, Tool, operator_reader
 from .bones import chosen_armature, deforming_bones, ends_seen_from
 from .follow import Bones, add_modifier, bind, set_parent
-from .weights import MOST, read_weights, takes_groups, weight_names, write_weights
+from .weights import MOST, named, read_weights, takes_groups, weight_names, write_weights
 
 _BUILDING = 0.6  # share of the time that the operator takes
-_NAMED = 5  # bones that a notice names
 _MOVED = 1e-5  # of the extent of the bones: they were moved meanwhile
 
 
@@ -125,9 +124,9 @@ class AutoWeights(Tool):
         notices = [
             *result.notices,
             *told,
-            *_named(locked, "Locked vertex groups, left as they are, with the others normalized around them"),
-            *_named(without, "Bones that no point follows"),
-            *_named(others, "Armatures that it follows beside this one, by modifiers"),
+            *named(locked, "Locked vertex groups, left as they are, with the others normalized around them"),
+            *named(without, "Bones that no point follows"),
+            *named(others, "Armatures that it follows beside this one, by modifiers"),
         ]
         followed = len(result.names) - len(without)
         line = f"{obj.name}: {len(result.weights):,} points follow {followed} bones of {armature.name}"
@@ -180,14 +179,6 @@ def _other_armatures(obj, armature):
     """Names of other armatures that modifiers of an object refer to."""
     found = [item.object for item in obj.modifiers if item.type == "ARMATURE"]
     return [other.name for other in found if other is not None and other != armature]
-
-
-def _named(names, what):
-    """Return a notice that names some of these, if there are any."""
-    if not names:
-        return []
-    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
-    return [f"{what}: {', '.join(names[:_NAMED])}{more}."]
 
 
 def _bind(obj, armature):

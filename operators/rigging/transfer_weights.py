@@ -13,9 +13,7 @@ from ..objects.attributes import point_count
 from ..registration import Registration, Row
 from .bones import followed_armature
 from .transfer import Transfer, TransferOperator, sides
-from .weights import MOST, has_weights, read_weights, weight_names, write_weights
-
-_NAMED = 5  # groups that a notice names
+from .weights import MOST, has_weights, named, read_weights, weight_names, write_weights
 
 
 class Weights(NamedTuple):
@@ -153,8 +151,8 @@ class TransferWeights(Transfer):
         written = moved if obj.type == "MESH" else every  # a point cloud has one table of all
         emptied = [name for name in others if name not in (*kept, *stay)]
         notices = [
-            *_named(locked, "Locked vertex groups, left as they are"),
-            *_named(emptied, "Groups of bones that the source has none of, emptied by Replace"),
+            *named(locked, "Locked vertex groups, left as they are"),
+            *named(emptied, "Groups of bones that the source has none of, emptied by Replace"),
         ]
 
         def compute(progress):
@@ -219,23 +217,14 @@ class TransferWeights(Transfer):
 def _check_groups(obj, names, locked):
     """Refuse an object that cannot hold these groups."""
     if all(name in locked for name in names):
-        raise PointCloudError(
-            f'All groups of "{obj.name}" that would be taken are locked: {", ".join(names[:_NAMED])}. Unlock some.'
-        )
+        told = named(names, f'All groups of "{obj.name}" that would be taken are locked')
+        raise PointCloudError(f"{' '.join(told)} Unlock some.")
     taken = [name for name in names if name in obj.data.attributes and name not in obj.vertex_groups]
     if obj.type == "MESH" and taken:
         raise PointCloudError(
             f'"{obj.name}" has attributes named {", ".join(taken)}, and vertex groups share their names. Rename these'
             " attributes."
         )
-
-
-def _named(names, what):
-    """Return a notice that names some of these, if there are any."""
-    if not names:
-        return []
-    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
-    return [f"{what}: {', '.join(names[:_NAMED])}{more}."]
 
 
 class MESHFREE_OT_transfer_weights(TransferWeights, TransferOperator, bpy.types.Operator):

@@ -15,6 +15,7 @@ from ..objects.splats import has_splats
 BONES, WEIGHTS = "lb_bones", "lb_bone_weights"  # attributes of point clouds, four numbers each
 NAMES = "lb_bone_names"  # custom property of their data
 MOST = 4  # bones that a point of a point cloud follows at most
+_NAMED = 5  # bones or groups that a notice names
 _LEAST = 1e-6  # weight from which a point is in a group
 
 
@@ -114,3 +115,11 @@ def remove_weights(obj):
     """Remove the table of a point cloud."""
     remove_attributes(obj.data, BONES, WEIGHTS)
     obj.data.pop(NAMES, None)
+
+
+def named(names, what) -> list:
+    """Return a notice that names some bones or groups, if there are any."""
+    if not names:
+        return []
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    return [f"{what}: {', '.join(names[:_NAMED])}{more}."]

@@ -61,7 +61,7 @@ def test_make_knows_what_to_do(snippet):
 
 @pytest.mark.parametrize("text", [text for text in NOT_RUN if "python -m" in text])
 def test_modules_and_the_variables_that_they_read_are_there(text):
-    found = importlib.util.find_spec(text.split()[-1])
+    found = importlib.util.find_spec(re.search(r"-m (\S+)", text)[1])
     assert found, text
     sources = [path.read_text(encoding="utf-8") for path in (ROOT / "benchmarks").rglob("*.py")]
     for name in re.findall(r"(\w+)=", text):
