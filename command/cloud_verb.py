@@ -1,6 +1,7 @@
 """Verbs for clouds of files: what is read, and the Laplacian of it."""
 
-from . import analysis, clouds, core
+from . import analysis, clouds
+from .inputs import add_choices, las_choices
 from .quantities import ORIENTATION
 from .settings import LAPLACIAN, add_setting, chosen, laplacian_options
 from .stages import ToldStages
@@ -30,21 +31,11 @@ class CloudVerb(Verb):
     def add_options(self, parser):
         for setting in self.settings:
             add_setting(parser, setting)
-        parser.add_argument(
-            "--columns",
-            default="",
-            metavar="NAMES",
-            help='names of the columns of text files, such as "x y z - r g b"; else those found',
-        )
-        parser.add_argument(
-            "--classes", default="", metavar="NUMBERS", help='classes of LAS files to read, such as "2 5"; else all'
-        )
-        parser.add_argument("--withheld", action="store_true", help="read points of LAS files, too, that are withheld")
+        add_choices(parser)
 
     def read(self, path, arguments, columns=""):
         """Return what a file holds, points or splats."""
-        las = core.files.LasChoices(core.files.parse_classes(arguments.classes), arguments.withheld)
-        return clouds.read_file(path, columns, las)
+        return clouds.read_file(path, columns, las_choices(arguments))
 
     def run(self, path, arguments, output):
         given = self.read(path, arguments, arguments.columns)

@@ -32,6 +32,25 @@ def add_files(parser, verb):
         parser.add_argument("--format", choices=endings, default=endings[0], help="outputs in the folder")
 
 
+def add_choices(parser):
+    """Add the options for what is read of files."""
+    parser.add_argument(
+        "--columns",
+        default="",
+        metavar="NAMES",
+        help='names of the columns of text files, such as "x y z - r g b"; else those found',
+    )
+    parser.add_argument(
+        "--classes", default="", metavar="NUMBERS", help='classes of LAS files to read, such as "2 5"; else all'
+    )
+    parser.add_argument("--withheld", action="store_true", help="read points of LAS files, too, that are withheld")
+
+
+def las_choices(arguments):
+    """Return which points of LAS files these options ask for."""
+    return core.files.LasChoices(core.files.parse_classes(arguments.classes), arguments.withheld)
+
+
 def _part(text):
     """Parse K/N."""
     match = re.fullmatch(r"(\d+)/(\d+)", text, re.ASCII)

@@ -6,10 +6,10 @@ import bpy
 
 from ...command import analysis, verbs
 from ...command.clouds import read_file
+from ...command.inputs import add_choices, las_choices
 from ...command.settings import add_setting, chosen
 from ...command.verb import Verb
 from ...core import PointCloudError
-from ...core.files import LasChoices, parse_classes
 from ..objects import options
 from ..objects.attributes import point_count
 from ..objects.notices import renew
@@ -53,16 +53,7 @@ class ObjectVerb(Verb):
 
     def add_options(self, parser):
         parser.add_argument("--object", default="", metavar="NAME", help="object of a .blend file; else the active one")
-        parser.add_argument(
-            "--columns",
-            default="",
-            metavar="NAMES",
-            help='names of the columns of text files, such as "x y z - r g b"; else those found',
-        )
-        parser.add_argument(
-            "--classes", default="", metavar="NUMBERS", help='classes of LAS files to read, such as "2 5"; else all'
-        )
-        parser.add_argument("--withheld", action="store_true", help="read points of LAS files, too, that are withheld")
+        add_choices(parser)
         settings = bpy.types.Object.bl_rna.properties["meshfree"].fixed_type.properties
         for name in _SETTINGS:
             add_setting(parser, as_setting(settings[name]))
@@ -75,8 +66,7 @@ class ObjectVerb(Verb):
     def open(self, path, option, arguments):
         """Open a file in place of the loaded one; return the object named by an option, with settings, and notices."""
         columns = arguments.columns if option == "object" else ""
-        las = LasChoices(parse_classes(arguments.classes), arguments.withheld)
-        read = partial(read_file, columns=columns, las=las)
+        read = partial(read_file, columns=columns, las=las_choices(arguments))
         obj, notices = opening.load(path, getattr(arguments, option), f"--{option.replace('_', '-')}", read)
         reason = obstacle(obj)
         if reason:

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import bpy
 import numpy as np
-from bpy.props import BoolProperty, FloatProperty, IntProperty
+from bpy.props import BoolProperty, FloatProperty
 
 from ... import core
 from ...core import NotASurfaceError, PointCloudError, TooFewPointsError
@@ -16,6 +16,7 @@ from ..registration import Registration, Row
 from ..running.application import ApplicationOperator, Tool, operator_reader
 from .bones import chosen_armature, deforming_bones, ends_seen_from
 from .follow import Bones, add_modifier, bind, set_parent
+from .limits import influences, least_weight
 from .weights import MOST, named, read_weights, takes_groups, weight_names, write_weights
 
 _BUILDING = 0.6  # share of the time that the operator takes
@@ -46,22 +47,8 @@ class AutoWeights(Tool):
         soft_min=0.25,
         soft_max=4.0,
     )
-    influences: IntProperty(
-        name="Influences",
-        description="How many bones a point follows at most; 0 for any number, in point clouds and splats 4 at most",
-        default=MOST,
-        min=0,
-        soft_max=8,
-        max=999,
-    )
-    least: FloatProperty(
-        name="Least Weight",
-        description="Smaller weights become zero; the largest of a point stays",
-        default=0.01,
-        min=0.0,
-        max=0.5,
-        subtype="FACTOR",
-    )
+    influences: influences(MOST)
+    least: least_weight()
     visible: BoolProperty(
         name="Visible",
         description="Points follow only bones that they see within the body, and not those of a limb beside it",

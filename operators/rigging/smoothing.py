@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import bpy
 import numpy as np
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from ... import core
 from ...core import PointCloudError
@@ -14,6 +14,7 @@ from ..registration import Registration, Row
 from ..running.application import Tool, operator_reader
 from ..tools.select import selected
 from .bones import deforming_bones
+from .limits import influences, least_weight
 from .painting import WeightOperator, in_selecting_mode
 from .weights import MOST, read_weights, weight_names, write_weights
 
@@ -85,22 +86,8 @@ class SmoothWeights(Tool):
         description="Let weights flow between loose parts of a mesh that touch, as at doubled vertices of a seam",
         default=False,
     )
-    influences: IntProperty(
-        name="Influences",
-        description="How many bones a point follows at most; 0 for any number, in point clouds 4 at most",
-        default=0,
-        min=0,
-        soft_max=8,
-        max=999,
-    )
-    least: FloatProperty(
-        name="Least Weight",
-        description="Smaller weights become zero; the largest of a point stays",
-        default=0.01,
-        min=0.0,
-        max=0.5,
-        subtype="FACTOR",
-    )
+    influences: influences(0)
+    least: least_weight()
 
     @property
     def asks(self):
