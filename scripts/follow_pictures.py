@@ -43,7 +43,7 @@ VIEW = (0.25, -1.0, 0.12)
 
 
 def armature():
-    """Add an armature for the armadillo; return it, and names, heads and tails of its bones."""
+    """Add an armature for the armadillo."""
     bones = {name: (parent, np.array(head), np.array(tail)) for name, (parent, head, tail) in SPINE.items()}
     for name, (parent, *sides) in SIDES.items():
         for letter, (head, tail) in zip("RL", sides, strict=True):
@@ -57,7 +57,7 @@ def armature():
         bone = obj.data.edit_bones.new(name)
         bone.head, bone.tail, bone.parent = head, tail, obj.data.edit_bones.get(parent)
     bpy.ops.object.mode_set(mode="OBJECT")
-    return obj, list(bones), *(np.array(ends) for ends in list(zip(*bones.values(), strict=True))[1:])
+    return obj
 
 
 def as_splats(points, laplacian):
@@ -70,7 +70,7 @@ def as_splats(points, laplacian):
     shade = 0.3 + 0.7 * np.maximum(normals @ (LIGHT / np.linalg.norm(LIGHT)), 0.0)
     splats = core.Splats(
         positions=points,
-        scales=radii[:, None] * [0.6, 0.6, 0.05],
+        scales=radii[:, None] * [1.0, 1.0, 0.05],
         rotations=core.splats.ellipsoids.quaternions_of(np.moveaxis(frames, 0, 2)),
         opacities=np.full(len(points), 0.95),
         colors=(shade[:, None] * ORANGE - 0.5) / 0.2821,
@@ -95,16 +95,13 @@ def bind_armature(path):
     bpy.ops.meshfree.convert()
     obj = bpy.context.object
     points = studio.world_points(obj)
-    laplacian = core.build_laplacian(points)
-    splats = as_splats(points, laplacian)
-    rig, names, heads, tails = armature()
-    weights = core.bone_weights(laplacian, heads, tails, influences=4)
+    splats = as_splats(points, core.build_laplacian(points))
+    rig = armature()
+    for other in bpy.context.view_layer.objects:
+        other.select_set(other in (obj, splats, rig))
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.meshfree.auto_weights(at_once=True)
     for each in (obj, splats):
-        studio.part("operators.rigging.weights").write_weights(each, names, weights)
-        for other in bpy.context.view_layer.objects:
-            other.select_set(other in (each, rig))
-        bpy.context.view_layer.objects.active = rig
-        bpy.ops.meshfree.bind_armature()
         each.meshfree.deform.preserve_volume = True
     for name, angles in POSE.items():
         turn(rig, name, angles)
