@@ -13,7 +13,7 @@ WITHOUT = {  # functions whose examples are those of what they go with, or which
     *("modes_needed", "points_that_fit", "signature_energies", "signature_times", "smoothing_base", "values_on_mesh"),
     *("read_splats", "write_splats"),
 }
-CLASSES = {"CoarseDeformer", "Deformer", "Doubt", "Geodesics", "LaplacianOptions", "Prolongation", "Slopes"}
+CLASSES = {"Agreed", "CoarseDeformer", "Deformer", "Doubt", "Geodesics", "LaplacianOptions", "Prolongation", "Slopes"}
 CLASSES |= {"Heat", "ReactionDiffusion", "Skinner", "Strays", "SurfaceMeasures", "Transport", "Wave"}
 METHODS = {"LaplaceBeltrami.apply", "LaplaceBeltrami.eigenpairs", "LaplaceBeltrami.toward", "paper.build_laplacian"}
 FUNCTIONS = {name for name in core.__all__ if inspect.isfunction(getattr(core, name))}

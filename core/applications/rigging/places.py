@@ -12,6 +12,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ...algebra import blocks, on_all_cores
 from ...arguments import as_doubles, check_array, check_finite, positive
+from ...cores import cores
 from ...errors import InvalidPointsError, PointCloudError
 from ...geometry import COUNT, SMOOTH, as_mask, balanced_weights, find_nearest, frames
 from ...operator import LaplaceBeltrami
@@ -213,7 +214,7 @@ def _match(
     count, width = len(every), min(_AROUND, many)
     first, distance, known = np.zeros(count, dtype=np.int64), np.empty(count), np.empty(count, dtype=bool)
     index, weight = np.empty((count, width), dtype=np.int64), np.empty((count, width))
-    sign = _signs(own, other, near.tree.query(every, workers=-1), limit)
+    sign = _signs(own, other, near.tree.query(every, workers=cores()), limit)
 
     def match(block: slice) -> None:
         places, row = every[block], np.arange(len(every[block]))
