@@ -1,6 +1,7 @@
 """Pictures of what follows an armature, of a scan; see scan_pictures.py."""
 
 import tempfile
+from functools import partial
 from pathlib import Path
 
 import bpy
@@ -40,6 +41,7 @@ POSE = {  # turns about world axes, in degrees
 LIGHT = np.array([-0.4, -0.7, 0.6])
 ORANGE = np.array([0.9, 0.45, 0.15])
 VIEW = (0.25, -1.0, 0.12)
+FRAMES, WAVING = 12, 20_000  # of the loop, and splats in it
 
 
 def armature():
@@ -63,14 +65,16 @@ def armature():
 def as_splats(points, laplacian):
     """Add splats in place of points: their discs, with the light of one lamp as colors."""
     core = studio.part("core")
-    normals, radii = laplacian.normals, laplacian.cell_radius
+    kept = laplacian.component >= 0
+    points, normals, radii = points[kept], laplacian.normals[kept], laplacian.cell_radius[kept]
+    radii = np.minimum(radii, 2.0 * np.median(radii))  # of the few whose cells nothing ends
     side = np.cross(normals, np.where(np.abs(normals[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]))
     side /= np.linalg.norm(side, axis=1, keepdims=True)
     frames = np.stack([side, np.cross(normals, side), normals], axis=2)
     shade = 0.3 + 0.7 * np.maximum(normals @ (LIGHT / np.linalg.norm(LIGHT)), 0.0)
     splats = core.Splats(
         positions=points,
-        scales=radii[:, None] * [1.0, 1.0, 0.05],
+        scales=radii[:, None] * [1.3, 1.3, 0.05],
         rotations=core.splats.ellipsoids.quaternions_of(np.moveaxis(frames, 0, 2)),
         opacities=np.full(len(points), 0.95),
         colors=(shade[:, None] * ORANGE - 0.5) / 0.2821,
@@ -81,6 +85,18 @@ def as_splats(points, laplacian):
         core.write_splats(path, splats)
         bpy.ops.meshfree.import_points(filepath=str(path), up="Z")
     return bpy.context.object
+
+
+def rigged(*objects):
+    """Let objects follow an armature for the armadillo; return it."""
+    rig = armature()
+    for other in bpy.context.view_layer.objects:
+        other.select_set(other in (*objects, rig))
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.meshfree.auto_weights(at_once=True)
+    for obj in objects:
+        obj.meshfree.deform.preserve_volume = True
+    return rig
 
 
 def bind_armature(path):
@@ -96,13 +112,7 @@ def bind_armature(path):
     obj = bpy.context.object
     points = studio.world_points(obj)
     splats = as_splats(points, core.build_laplacian(points))
-    rig = armature()
-    for other in bpy.context.view_layer.objects:
-        other.select_set(other in (obj, splats, rig))
-    bpy.context.view_layer.objects.active = rig
-    bpy.ops.meshfree.auto_weights(at_once=True)
-    for each in (obj, splats):
-        each.meshfree.deform.preserve_volume = True
+    rig = rigged(obj, splats)
     for name, angles in POSE.items():
         turn(rig, name, angles)
     for each in (obj, splats):
@@ -117,6 +127,35 @@ def bind_armature(path):
     studio.row([rest, obj, splats], path, legend=None, view=VIEW, size=(1000, 340))
 
 
+def rig_wave(path):
+    """The armadillo as splats, which waves by the bones of an arm."""
+    core = studio.part("core")
+    (scan,) = scan_pictures.scan("armadillo")
+    points = studio.world_points(scan)
+    points = points[core.thin_out(points, count=WAVING)]
+    splats = as_splats(points, core.build_laplacian(points))
+    bpy.data.objects.remove(scan)
+    rig = rigged(splats)
+
+    def wave(share):
+        for bone in rig.pose.bones:
+            bone.matrix_basis = Matrix()
+        bpy.context.view_layer.update()
+        swing = np.sin(2.0 * np.pi * share)
+        for name, angles in {
+            "chest": (0, 3 * swing, 0),
+            "upper_arm.R": (0, 15, 0),
+            "lower_arm.R": (0, 30 * swing, 0),
+        }.items():
+            turn(rig, name, angles)
+        turn(rig, "hand.R", (0, 25 * np.sin(2.0 * np.pi * (share - 0.1)), 0))
+        turn(rig, "head", (0, 0, 12 + 4 * swing))
+        studio.activate(splats)
+        bpy.ops.meshfree.deform_update()
+
+    studio.loop(splats, (partial(wave, share) for share in np.arange(FRAMES) / FRAMES), path, VIEW)
+
+
 def turn(rig, name, angles):
     """Turn a bone in a pose about its head, by angles about the axes of the world, in degrees."""
     bone = rig.pose.bones[name]
@@ -126,4 +165,4 @@ def turn(rig, name, angles):
     bpy.context.view_layer.update()
 
 
-PICTURES = {"bind_armature": bind_armature}
+PICTURES = {"bind_armature": bind_armature, "rig_wave": rig_wave}
