@@ -238,11 +238,11 @@ def corrections_off(names):
         "squared slope": [(cloud, "measure_squared_slope", lambda nearest, _: np.zeros(len(nearest.points)))],
         "h that varies": [(areas, "uneven", np.zeros_like), (weights, "uneven", np.zeros_like)],
         "images across corners": mirrors,
-        "areas of the kernel": [(areas, "fast_areas", lambda _, __, cell: cell)],
+        "areas of the kernel": [(areas, "fast_areas", lambda _, __, cell, *more: cell)],
         "areas of the cells": [(areas, "_like_cells", lambda _, values, __: values)],
         "balance of the weights": [(weights, "_ROUNDS", 0)],
         "width of the weights": [(stiffness, "_widths", lambda pairs, *_: pairs.lengths)],
-        "outliers": [(cloud, "find_outliers", lambda nearest: np.zeros(len(nearest.points), dtype=bool))],
+        "outliers": [(cloud, "find_outliers", lambda nearest, *_: np.zeros(len(nearest.points), dtype=bool))],
         "noise": [(cloud, "noise_level", lambda nearest, *misfits: np.zeros(len(nearest.points)))],
         "sheets apart": [(cloud, "separate_sheets", lambda pairs, *_: pairs)],
     }

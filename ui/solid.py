@@ -84,7 +84,7 @@ def follow(obj, values, colors_of, radius):
 
 def _tilts(data, values, colors_of, radius):
     """Return the derivative of colours by the value, (n, 3), averaged across each disc."""
-    slope = np.linalg.norm(read_attribute(data, SLOPE), axis=1)
+    slope = np.linalg.norm(read_attribute(data, SLOPE).astype(np.float64), axis=1)
     rise = slope * radius * np.linalg.norm(read_attribute(data, DISC), axis=1)
     low, high = values - rise, values + rise
     some = (rise > 1e-6 * max(float(np.ptp(values)), 1e-30)) & (high > low)  # values may differ by rounding alone
