@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from ..geometry import Agreed, check_points
+from ..geometry import Agreed
 from ..operator import build_laplacian, mean_curvature
 from ..options import LaplacianOptions
 from ..types import Bools, Floats, Ints, Progress
@@ -92,7 +92,7 @@ def measure_tile(
     >>> print(sum(part.areas.sum() for part in parts).round(1))
     12.6
     """
-    points = check_points(points)
+    points = np.asarray(points)
     count, inner = len(points), np.flatnonzero(tile.inner)
     part = build_laplacian(points[tile.rows], options=options, agreed=agreed.among(tile.rows, count), progress=progress)
     label = agreed.component if agreed.sheet is None else agreed.sheet

@@ -10,12 +10,11 @@ from ... import core
 from ...core import NotASurfaceError, PointCloudError, TooFewPointsError
 from ..objects.attributes import DISC
 from ..objects.groups import has_group
-from ..objects.place import moves_with
 from ..objects.reading import TYPES, find_object, obstacle, sharing_objects
 from ..registration import Registration, Row
 from ..running.application import ApplicationOperator, Tool, operator_reader
 from .bones import chosen_armature, deforming_bones, ends_seen_from
-from .follow import Bones, add_modifier, bind, set_parent
+from .follow import add_modifier, bind, check_bindable, set_parent
 from .limits import influences, least_weight
 from .weights import MOST, named, read_weights, takes_groups, weight_names, write_weights
 
@@ -122,12 +121,7 @@ class AutoWeights(Tool):
 
 def _check_objects(obj, armature, names):
     """Refuse an object that cannot follow these bones, before anything is computed."""
-    if moves_with(armature, obj):
-        raise PointCloudError(
-            f'"{armature.name}" moves with "{obj.name}", its parent. Clear the parent of the armature (Alt P).'
-        )
-    if obj.meshfree.deform.is_bound and obj.meshfree.deform.kind != Bones.name:
-        raise PointCloudError(f'"{obj.name}" follows handles. Apply or unbind it first.')
+    check_bindable(obj, armature)
     taken = [name for name in names if name in obj.data.attributes and not has_group(obj, name)]
     if taken and obj.type == "MESH":
         raise PointCloudError(

@@ -20,11 +20,10 @@ from ..objects.reading import read_points
 from ..objects.splats import has_splats, read_splats
 from .bone_follower import BoneBinding, BoneFollower, BonePose
 from .bones import bone_matrices, envelopes
-from .weights import BONES, NAMES, WEIGHTS, has_weights, takes_groups, weight_names, weight_table
+from .weights import BONES, NAMES, WEIGHTS, has_weights, listed, takes_groups, weight_names, weight_table
 
 _LEAST = 1e-4  # sum of the weights of a point below which Blender lets it follow no bone
 _SAME = 1e-5  # of the size of an armature: bones at the same place at rest
-_NAMED = 5  # bones that a text names
 
 
 class Bones:
@@ -65,7 +64,7 @@ class Bones:
             return "The armature was deleted. Select another one, too, and bind again"
         missing = [name for name in _names(obj) if name not in armature.data.bones]
         if missing:
-            return f'Bones of "{armature.name}" were renamed or deleted: {_listed(missing)}. Bind again'
+            return f'Bones of "{armature.name}" were renamed or deleted: {listed(missing)}. Bind again'
         return ""
 
     def changed(self, obj, glance, trusting):
@@ -156,24 +155,28 @@ def bind(obj, armature) -> list:
     return write_bound(obj, armature, plan_bound(bpy.context, obj, armature))
 
 
-def plan_bound(context, obj, armature) -> Bound:
-    """Read what `bind` needs, and refuse what it cannot bind."""
-    settings = obj.meshfree.deform
-    if settings.is_bound and settings.kind != Bones.name:
-        raise PointCloudError(f'"{obj.name}" follows handles. Apply or unbind it first.')
-    if not has_weights(obj):
-        raise PointCloudError(f'"{obj.name}" has no weights of bones. Run Automatic Weights first.')
+def check_bindable(obj, armature):
+    """Refuse an object that follows handles, or that the armature moves with."""
     if moves_with(armature, obj):
         raise PointCloudError(
             f'"{armature.name}" moves with "{obj.name}", its parent. Clear the parent of the armature (Alt P).'
         )
+    if obj.meshfree.deform.is_bound and obj.meshfree.deform.kind != Bones.name:
+        raise PointCloudError(f'"{obj.name}" follows handles. Apply or unbind it first.')
+
+
+def plan_bound(context, obj, armature) -> Bound:
+    """Read what `bind` needs, and refuse what it cannot bind."""
+    check_bindable(obj, armature)
+    if not has_weights(obj):
+        raise PointCloudError(f'"{obj.name}" has no weights of bones. Run Automatic Weights first.')
     bones, known = armature.data.bones, weight_names(obj)
     renamed = _renamed(obj, armature, known)
     names = [renamed.get(name, name) for name in known if renamed.get(name, name) in bones]
     if not names:
         raise PointCloudError(
             f'"{obj.name}" has weights of no bone of "{armature.name}". Run Automatic Weights, or name its bones as'
-            f" they were: {_listed(known)}."
+            f" they were: {listed(known)}."
         )
     reading = read_points(context, obj)
     notices = [] if takes_groups(obj) else _notices(obj, armature, known, renamed)
@@ -240,13 +243,13 @@ def _notices(obj, armature, known, renamed):
     followed = [renamed.get(known[number], known[number]) for number in used]
     gone = [name for name in followed if name not in bones]
     if gone:
-        notices.append(f'"{armature.name}" has no bones {_listed(gone)}: their points follow their other bones.')
+        notices.append(f'"{armature.name}" has no bones {listed(gone)}: their points follow their other bones.')
     idle = [name for name in followed if name in bones and not bones[name].use_deform]
     if idle:
-        notices.append(f"Bones that do not deform, and are not followed: {_listed(idle)}.")
+        notices.append(f"Bones that do not deform, and are not followed: {listed(idle)}.")
     bendy = [name for name in followed if name in bones and bones[name].bbone_segments > 1]
     if bendy:
-        notices.append(f"Bendy bones, followed as straight ones: {_listed(bendy)}.")
+        notices.append(f"Bendy bones, followed as straight ones: {listed(bendy)}.")
     there = np.array([renamed.get(name, name) in bones for name in known])
     without = np.count_nonzero((shares * there[table]).sum(axis=1) <= _LEAST)
     if without:
@@ -338,11 +341,6 @@ def _weights_checksum(obj):
     for name in (BONES, WEIGHTS):
         checksum = zlib.crc32(read_attribute(obj.data, name), checksum)
     return f"{checksum:08x}"
-
-
-def _listed(names):
-    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
-    return f"{', '.join(names[:_NAMED])}{more}"
 
 
 def _on_weights(obj):

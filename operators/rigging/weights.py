@@ -7,7 +7,7 @@ numbers, are a custom property of the data.
 import numpy as np
 
 from ...core import PointCloudError
-from ..objects.attributes import read_attribute, remove_attributes, tag_changed, write_attribute
+from ..objects.attributes import read_attribute, tag_changed, write_attribute
 from ..objects.groups import put_group
 from ..objects.handlers import notify
 from ..objects.splats import has_splats
@@ -15,7 +15,7 @@ from ..objects.splats import has_splats
 BONES, WEIGHTS = "lb_bones", "lb_bone_weights"  # attributes of point clouds, four numbers each
 NAMES = "lb_bone_names"  # custom property of their data
 MOST = 4  # bones that a point of a point cloud follows at most
-_NAMED = 5  # bones or groups that a notice names
+_NAMED = 5  # bones or groups that a text names
 _LEAST = 1e-6  # weight from which a point is in a group
 
 
@@ -111,15 +111,12 @@ def write_weights(obj, names, weights):
     notify("weights_changed", obj)
 
 
-def remove_weights(obj):
-    """Remove the table of a point cloud."""
-    remove_attributes(obj.data, BONES, WEIGHTS)
-    obj.data.pop(NAMES, None)
+def listed(names) -> str:
+    """Return the first names of bones or groups, and how many more there are."""
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    return f"{', '.join(names[:_NAMED])}{more}"
 
 
 def named(names, what) -> list:
     """Return a notice that names some bones or groups, if there are any."""
-    if not names:
-        return []
-    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
-    return [f"{what}: {', '.join(names[:_NAMED])}{more}."]
+    return [f"{what}: {listed(names)}."] if names else []

@@ -37,25 +37,7 @@ def _natural(name):
 
 
 def continue_modes(analysis, points, earlier):
-    """Match the modes of an analysis to those of the frame before.
-
-    Parameters
-    ----------
-    analysis : Analysis
-        With modes.
-    points : ndarray, (n, 3)
-        All points of the object, in the world.
-    earlier : tuple of Spectrum and ndarray, or None
-        The third result for the frame before; None for the first frame, which is not changed.
-
-    Returns
-    -------
-    Analysis
-    ndarray, (count,)
-        How well each mode continues, see `match_modes`.
-    tuple
-        For the next frame.
-    """
+    """Return an analysis with matched modes, and the rest of what `continued` returns."""
     spectrum, overlaps, earlier = continued(analysis.spectrum, analysis.measures[AREA], points, earlier)
     return replace(analysis, spectrum=spectrum), overlaps, earlier
 

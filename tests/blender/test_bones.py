@@ -73,5 +73,5 @@ def test_a_point_cloud_keeps_its_four_largest_weights(weights):
     assert weights.weight_names(obj) == list("abcde")
     assert np.allclose(found[0], np.array([0.3, 0.25, 0.2, 0.15, 0.0]) / 0.9)
     assert np.allclose(found[1:], given[1:])
-    weights.remove_weights(obj)
+    obj.data.attributes.remove(obj.data.attributes[weights.BONES])
     assert not weights.has_weights(obj)

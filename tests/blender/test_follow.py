@@ -424,7 +424,7 @@ class TestBinding:
     @pytest.mark.parametrize(
         ("prepare", "text"),
         [
-            (lambda obj, arm: part("operators.rigging.weights").remove_weights(obj), "has no weights of bones"),
+            (lambda obj, arm: obj.data.attributes.remove(obj.data.attributes["lb_bones"]), "has no weights of bones"),
             (lambda obj, arm: [setattr(bone, "name", f"Other{bone.name}") for bone in arm.data.bones], "of no bone of"),
             (lambda obj, arm: setattr(arm, "parent", obj), "moves with"),
         ],
