@@ -89,6 +89,8 @@ def test_few_influences_and_none_below_the_least_stay(strip):
     assert np.array_equal(few[:, 5], weights[:, 5])
     assert few.sum(axis=1) == pytest.approx(1.0, abs=1e-12)
     assert np.array_equal(few[:, :5].argmax(axis=1), weights[:, :5].argmax(axis=1))
+    every = core.smooth_weights(laplacian, weights, 0.0, influences=2**70, least=0.1)
+    assert np.array_equal(every, core.smooth_weights(laplacian, weights, 0.0, influences=6, least=0.1))
     half = core.smooth_weights(laplacian, 0.5 * weights, 0.0, influences=1)
     assert half.max(axis=1) == pytest.approx(0.5, abs=1e-12)
 

@@ -107,6 +107,7 @@ def smooth_weights(
     most = width if influences is None else whole(influences)
     if not most >= 1:
         raise PointCloudError(f"Points keep {influences} weights. Keep at least one.")
+    most = int(min(most, width))
     held = as_mask(() if locked is None else locked, width)
     smoothed = (as_mask(columns, width) if columns is not None else np.ones(width, dtype=bool)) & ~held
     some = as_mask(chosen, count) if chosen is not None else np.ones(count, dtype=bool)
