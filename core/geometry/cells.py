@@ -196,7 +196,7 @@ def _intersect(cuts: Floats, gaussian_curvature: Floats, furthest: Floats | floa
         chosen = np.where(other, along, -np.inf).argmax(axis=1)
         every = np.arange(len(rows))
         there = np.stack([x[every, chosen], y[every, chosen]])
-        ahead = np.stack([step_x[every, chosen], step_y[every, chosen]]) / length[every, chosen]
+        ahead = np.stack([step_x[every, chosen], step_y[every, chosen]]) / np.maximum(length[every, chosen], 1e-300)
         across = here[0] * there[1] - here[1] * there[0]
         out = across <= _SAME * np.hypot(*here) * np.hypot(*there)
         before = corner

@@ -15,7 +15,7 @@ from benchmarks.samplings import (
     uneven_sphere,
 )
 from core.geometry.boundary import no_boundary
-from core.geometry.cells import measure_cells
+from core.geometry.cells import _intersect, measure_cells
 from core.geometry.cloud import read_cloud, read_surface
 from core.geometry.nearest import find_nearest
 from core.options import LaplacianOptions
@@ -92,6 +92,11 @@ def test_without_neighbors_a_cell_ends_a_spacing_away():
     areas = cell_areas(square_grid(20), boundary="off")
     assert 1.0 < areas.sum() < (1.0 + 2.6 / 19.0) ** 2
     assert areas.max() < 4.0 / 19.0**2
+
+
+def test_a_point_that_no_neighbor_cuts_has_no_closed_cell():
+    areas, radius, closed = _intersect(np.zeros((1, 6, 2)), np.zeros(1), np.inf)
+    assert not closed.any() and areas.tolist() == radius.tolist() == [0.0]
 
 
 def test_trust_is_low_where_the_points_do_not_tell():
