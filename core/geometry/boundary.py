@@ -21,7 +21,6 @@ from .sheets import on_sheet
 _BLOCK = 1 << 13  # points looked at at one time
 _ANGLE = np.radians(100.0)  # widest angle without a neighbour, at least
 _PROBE, _EMPTY = 8.0, 0.6  # no point within 0.6 of 8 gaps of the place 8 gaps further out
-_AROUND = 5.0  # radii of the empty place that candidates must go around it, of 2 pi: chance leaves some of them out
 _REACH = 20.0  # spacings from a boundary at which no kernel sees it
 _PART = 3  # of a short boundary no more than a third: a longer part of a square's has two corners
 _LEVEL = 1.45  # a boundary runs that many standard deviations outside the mean of its candidates
@@ -116,7 +115,7 @@ def find_boundary(nearest: Nearest, oriented: Floats, gaps: Floats) -> Bools:
         return result
     label = _label_courses(points[rows], _PROBE * gaps[rows])
     length = np.bincount(label, nearest.spacing[rows] / gaps[rows])
-    result[rows] = length[label] >= _AROUND * _EMPTY * _PROBE
+    result[rows] = length[label] >= 2.0 * np.pi * _EMPTY * _PROBE
     return result
 
 
