@@ -148,7 +148,12 @@ def fit_sheets(nearest: Nearest, before: Sheets | None = None, changed: Bools | 
     changed = changed | changed[index].any(axis=1)
     asked = np.flatnonzero(changed & (missed | missed[index].any(axis=1)))
     kept = np.ones(index.shape, dtype=bool)
-    kept[asked] = on_sheet(nearest, planes, asked, index[asked], nearest.distance[asked])[0]
+
+    def judge(part: slice) -> None:
+        block = asked[part]
+        kept[block] = on_sheet(nearest, planes, block, index[block], nearest.distance[block])[0]
+
+    on_all_cores(judge, blocks(len(asked), _BLOCK))
     nearest, quadrics = nearest.keep(kept), mixed
     again = changed & (nearest.weight != whole).any(axis=1)
     if before is not None:
