@@ -66,7 +66,7 @@ def column_notices(obj, attributes) -> list:
     """Return notices of columns of a file, by name, that are renamed or stored in another form."""
     there = obj.data.attributes
     kept = kept_columns(obj).items()
-    notices = [f"{obj.name}: {_description(name, *column)}; exports write it as it was" for name, column in kept]
+    notices = [f"{obj.name}: {_description(name, *column)}" for name, column in kept]
     names = [name for name in attributes if RENAMED + name in there and RENAMED + name not in attributes]
     renamed = [f"{name} as {RENAMED}{name}" for name in names]
     if renamed:
