@@ -19,6 +19,7 @@ SMALL = 1000  # unknowns that are solved whole in a tenth of a second
 PART = 1 << 20  # entries of a matrix that are multiplied at once: some hundredths of a second
 STRONG = (3e-3, 1e-2, 3e-2, 0.1)  # share of the diagonal from which two unknowns may be one on the next level: of the
 # first about 20 become one, with the others fewer
+_ROUNDING = 1e-12  # share of the largest diagonal entry below which one is rounding
 _SMOOTHED = 0.3  # smoothing reduces the errors whose eigenvalues are at least this share of the largest
 
 Result = TypeVar("Result")
@@ -150,6 +151,9 @@ def build_levels(
     mass = None
     while matrix.shape[0] > least:
         n, diagonal, rows = matrix.shape[0], matrix.diagonal(), Rows(matrix, pool, report)
+        highest = diagonal.max()
+        # One that stands for a whole component couples with nothing, and is left to the last version.
+        diagonal[diagonal <= _ROUNDING * highest] = np.inf
         for share in STRONG:
             part = aggregates(rows, diagonal, share, report)[0]
             if part.max() >= enough:
@@ -167,7 +171,7 @@ def build_levels(
                 matrix=rows,
                 rough=Rows(_single(matrix), pool, report),
                 mass=mass,
-                top=top * diagonal.max(),
+                top=top * highest,
                 steps=[step[:, None].astype(np.float32) for step in smoothing_steps(top, diagonal)],
                 prolongation=Rows(prolongation, pool, report),
                 extension=Rows(_single(prolongation), pool, report),
@@ -301,7 +305,9 @@ def _shorten(level: Level) -> None:
     Two steps do not if ``1 / first + 1 / second``, here with the diagonal, is more than any eigenvalue, and these are
     not more than the largest sum over a row of sizes (Gershgorin). The estimated largest eigenvalue may be too low.
     """
-    room = np.sum([1.0 / step[:, 0] for step in level.steps], axis=0)
+    # No step has no end of room.
+    steps = np.stack([step[:, 0] for step in level.steps])
+    room = np.divide(1.0, steps, out=np.full_like(steps, np.inf), where=steps > 0.0).sum(axis=0)
 
     def excess(rows: slice, part: sparse.csr_array) -> float:
         return float(np.max(np.add.reduceat(np.abs(part.data), part.indptr[:-1]) / room[rows]))

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 import core
 from benchmarks.samplings import random_sphere
-from core.algebra import solvers
+from core.algebra import coarse_to_fine, solvers
 from core.algebra.hierarchy import Rows, approximate_inverse
 from core.algebra.solvers import conjugate_gradients, solve_symmetric
 
@@ -125,6 +125,24 @@ def test_the_inverse_is_symmetric_and_positive(twins):
     np.testing.assert_allclose(y @ one, x @ other, rtol=0.0, atol=1e-5 * np.linalg.norm(y) * np.linalg.norm(one))
     assert x @ one > 0.0
     assert y @ other > 0.0
+
+
+def test_components_that_become_one_unknown_each():
+    """Their diagonal is rounding then, by which nothing may be divided."""
+    big = kernel_matrix(random_sphere(12_000), 10.0 / np.sqrt(12_000))  # a thousand on the second level
+    small = [kernel_matrix(random_sphere(24, seed), 3.0) for seed in range(12)]
+    matrix = sparse.block_diag([big, *small], format="csr")
+    count = len(small) + 4
+    values, vectors = coarse_to_fine(matrix, np.ones(matrix.shape[0]), count, 1e-6, 0.0, lambda fraction=0.0: None)
+    assert np.abs(values[: 1 + len(small)]).max() < 1e-9 * values[-1]
+    missed = np.linalg.norm(matrix @ vectors - vectors * values, axis=0)
+    assert missed.max() < 1e-6 * values[-1]
+    assert values[-3] > 0.5 * values[-1]  # the three of degree one
+    load = np.concatenate([points - points.mean() for points in (random_sphere(12_000)[:, 2], *np.eye(24)[:12])])
+    with ThreadPoolExecutor() as pool:
+        found = conjugate_gradients(matrix, load, scaling=approximate_inverse(matrix, pool, silent))
+    assert found.converged
+    assert found.products < 20
 
 
 def test_the_result_does_not_depend_on_cores(operators, coarse, monkeypatch):
