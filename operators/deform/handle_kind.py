@@ -9,7 +9,7 @@ from mathutils import Matrix
 from ..objects.animation import moves_by_keys, stop_moving
 from ..objects.attributes import REST, own_positions, point_count, positions_now, read_attribute, write_own_positions
 from ..objects.carried import carries
-from ..objects.counting import members
+from ..objects.counting import all_members
 from ..objects.groups import handle_names
 from . import binding, kinds
 from .binding import WRITES, bound_objects
@@ -64,7 +64,7 @@ class Handles:
 
     def changed(self, obj, glance, trusting):
         names = handle_names(obj)
-        found = [members(obj, name, glance, trusting) for name in (*names, obj.meshfree.deform.anchors)]
+        found = all_members(obj, (*names, obj.meshfree.deform.anchors), glance, trusting)
         if None in found:
             return None
         by_empty = moved_by_empties(obj)

@@ -77,9 +77,34 @@ class _Pass:
     """A pass over the vertices of an object that counts groups; undo does not affect it."""
 
     names: list
-    weights: np.ndarray
+    count: int  # vertices
+    parts: list = field(default_factory=list)  # rows of names, vertices, and weights
     place: int = 0
     seconds: float = 0.0
+
+    def go_on(self, obj, count: int):
+        """Read the groups of the next so many vertices."""
+        began = perf_counter()
+        rows = {obj.vertex_groups[name].index: row for row, name in enumerate(self.names)}
+        chunk = obj.data.vertices[self.place : self.place + count]
+        held = [
+            (rows[item.group], index, item.weight)
+            for index, vertex in enumerate(chunk, start=self.place)
+            for item in vertex.groups
+            if item.group in rows
+        ]
+        self.parts.append(np.array(held, dtype=np.float64).reshape(-1, 3))
+        self.place += len(chunk)
+        self.seconds += perf_counter() - began
+
+    def end(self, known):
+        """Keep what all vertices gave."""
+        row, index, weight = np.concatenate(self.parts).T if self.parts else np.empty((3, 0))
+        for number, name in enumerate(self.names):
+            mine, weights = row == number, np.full(self.count, np.nan, np.float32)
+            weights[index[mine].astype(np.int64)] = weight[mine]
+            known.members[name] = summarize(weights)
+            known.until[name] = perf_counter() + _PATIENCE * self.seconds
 
 
 _known = {}  # by session_uid
@@ -88,35 +113,39 @@ _passes = {}  # by session_uid
 
 
 def members(obj, name: str, glance=False, trusting=False) -> Members | None:
-    """Summarize a group.
+    """Summarize one group; see `all_members`."""
+    return all_members(obj, [name], glance, trusting)[0]
+
+
+def all_members(obj, names, glance=False, trusting=False) -> list:
+    """Summarize several groups, `Members` each.
 
     Parameters
     ----------
     obj : bpy.types.Object
-    name : str
-        The group; a missing one has no points.
+    names : sequence of str
+        The groups; a missing one has no points.
     glance : bool
-        Be quick: a change may be missed for some seconds, and the result is None until the first count.
+        Be quick: a change may be missed for some seconds, and a group is None until its first count.
     trusting : bool
         Be quicker: take the last count, however old, unless undo or this extension changed the group.
     """
-    if not has_group(obj, name):
-        return Members()
+    there = [name for name in names if has_group(obj, name)]
     if obj.type != "MESH":
-        return summarize(group_weights(obj, name, outside=np.nan))
-    known = _recall(obj)
-    until = known.until.get(name, 0.0)
-    if glance and name in known.members and until and (trusting or perf_counter() < until):
-        return known.members[name]
-    if glance and not bpy.app.background and point_count(obj.data) > _AT_ONCE:
-        _wanted.setdefault(obj.session_uid, set()).add(name)
+        found = {name: summarize(group_weights(obj, name, outside=np.nan)) for name in there}
+        return [found.get(name, Members()) for name in names]
+    known, now = _recall(obj), perf_counter()
+    counted = [name for name in there if glance and name in known.members and known.until.get(name)]
+    due = [name for name in there if name not in counted or not (trusting or now < known.until[name])]
+    if due and glance and not bpy.app.background and point_count(obj.data) > _AT_ONCE:
+        _wanted.setdefault(obj.session_uid, set()).update(due)
         if not bpy.app.timers.is_registered(_tick):
             bpy.app.timers.register(_tick, first_interval=_PAUSE)
-        return known.members.get(name)
-    began = perf_counter()
-    known.members[name] = summarize(group_weights(obj, name, outside=np.nan))
-    known.until[name] = perf_counter() + _PATIENCE * (perf_counter() - began)
-    return known.members[name]
+    elif due:
+        work = _Pass(due, point_count(obj.data))
+        work.go_on(obj, work.count)
+        work.end(known)
+    return [known.members.get(name) if name in there else Members() for name in names]
 
 
 def renew_counts(obj):
@@ -155,31 +184,16 @@ def _go_on(obj) -> bool:
     """Count for a moment in an object; return whether all is counted."""
     uid, count = obj.session_uid, point_count(obj.data)
     work = _passes.get(uid)
-    if work is None or work.weights.shape[1] != count or any(not has_group(obj, name) for name in work.names):
+    if work is None or work.count != count or any(not has_group(obj, name) for name in work.names):
         names = [name for name in _wanted[uid] if has_group(obj, name)]
-        work = _passes[uid] = _Pass(names, np.full((len(names), count), np.nan, np.float32))
-    rows = {obj.vertex_groups[name].index: row for row, name in enumerate(work.names)}
+        work = _passes[uid] = _Pass(names, count)
     began = perf_counter()
     while work.place < count and perf_counter() < began + _STEP:
-        chunk = obj.data.vertices[work.place : work.place + _CHUNK]
-        held = [
-            (rows[item.group], index, item.weight)
-            for index, vertex in enumerate(chunk, start=work.place)
-            for item in vertex.groups
-            if item.group in rows
-        ]
-        if held:
-            row, index, weight = zip(*held, strict=True)
-            work.weights[row, index] = weight
-        work.place += len(chunk)
-    work.seconds += perf_counter() - began
+        work.go_on(obj, _CHUNK)
     if work.place < count:
         return False
     del _passes[uid]
-    known = _recall(obj)
-    for name, weights in zip(work.names, work.weights, strict=True):
-        known.members[name] = summarize(weights)
-        known.until[name] = perf_counter() + _PATIENCE * work.seconds
+    work.end(_recall(obj))
     _wanted[uid] -= set(work.names)
     _wanted[uid] = {name for name in _wanted[uid] if has_group(obj, name)}
     if not _wanted[uid]:

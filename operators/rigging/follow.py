@@ -9,10 +9,12 @@ from mathutils import Matrix
 
 from ...core import PointCloudError
 from ..deform import binding, kinds, live
+from ..deform.handles import groups_checksum
 from ..deform.nodes import add_deform
 from ..deform.pose import POSE, State, is_there, relative_matrix, write_displacement
 from ..objects.attributes import point_count, read_attribute
 from ..objects.carried import carries
+from ..objects.counting import all_members
 from ..objects.handlers import add_handlers, notify, remove_handlers
 from ..objects.modifiers import is_own
 from ..objects.place import moves_with
@@ -75,7 +77,10 @@ class Bones:
         now = bone_matrices(settings.armature.data.bones, _names(obj), "matrix_local")
         if not _same(rest, now).all():
             return f'The rest pose of "{settings.armature.name}" changed. Bind again', ()
-        if not takes_groups(obj) and (not has_weights(obj) or settings.groups_used != _weights_checksum(obj)):
+        used = _weights_checksum(obj, glance=True) if has_weights(obj) else ""
+        if used is None:
+            return None
+        if used != settings.groups_used:
             return "The weights of the bones changed. Bind again", ()
         return "", ()
 
@@ -194,8 +199,7 @@ def write_bound(obj, armature, bound: Bound) -> list:
     for name in bound.names:
         item = settings.bone_items.add()
         item.name, item.rest = name, np.array(armature.data.bones[name].matrix_local).ravel()
-    checksum = "" if takes_groups(obj) else _weights_checksum(obj)
-    binding.record(obj, Bones.name, bound.rest, bound.matrix, checksum)
+    binding.record(obj, Bones.name, bound.rest, bound.matrix, _weights_checksum(obj))
     add_deform(obj)
     notify("shape_changed", obj)
     context.scene.render.use_lock_interface = True  # Blender crashes when it draws what handlers change in a render
@@ -335,8 +339,15 @@ def _rest(obj):
     return np.array([item.rest for item in items], np.float64).reshape(-1, 4, 4)
 
 
-def _weights_checksum(obj):
-    """Return the checksum of the table of weights."""
+def _weights_checksum(obj, glance=False):
+    """Return the checksum of the table of weights, or of the vertex groups of the bones; for glances see `all_members`.
+
+    It is None where these were not counted yet.
+    """
+    if takes_groups(obj):
+        names = _names(obj)
+        found = all_members(obj, names, glance)
+        return None if None in found else groups_checksum(names, [group.weighted for group in found])
     checksum = zlib.crc32(repr(weight_names(obj)).encode())
     for name in (BONES, WEIGHTS):
         checksum = zlib.crc32(read_attribute(obj.data, name), checksum)
@@ -347,7 +358,7 @@ def _on_weights(obj):
     """Let a bound object follow by weights that the extension has changed."""
     settings = obj.meshfree.deform
     if settings.is_bound and settings.kind == Bones.name and settings.point_count == point_count(obj.data):
-        settings.groups_used = "" if takes_groups(obj) else _weights_checksum(obj)
+        settings.groups_used = _weights_checksum(obj)
         binding.renew(obj)
         live.settle_later(obj)
 

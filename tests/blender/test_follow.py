@@ -597,6 +597,44 @@ class TestMeshes:
         bpy.context.view_layer.update()
         assert np.abs(attribute(obj, "lb_moved_disc") - linear).max() > 0.01
 
+    @pytest.mark.parametrize(
+        "paint",
+        [
+            lambda groups: groups["Bone.1"].add(range(24), 0.7, "REPLACE"),
+            lambda groups: groups["Bone.1"].remove(range(300)),
+            lambda groups: groups.remove(groups["Bone.1"]),
+        ],
+    )
+    def test_painted_weights_are_told_and_taken_when_bound_again(self, mesh, paint, counting):
+        obj, armature = mesh
+        assert stale(obj) == ""
+        paint(obj.vertex_groups)
+        counting.renew_counts(obj)  # as happens within some seconds
+        assert "The weights of the bones changed. Bind again" in stale(obj)
+        select(obj)
+        assert "Bind Again" in texts(obj)
+        assert bpy.ops.meshfree.bind_armature() == {"FINISHED"}
+        assert stale(obj) == ""
+        pose(armature, "Bone.1")
+        assert np.abs(attribute(obj, "lb_moved_disc") - attribute(obj, "lb_disc")).max() > 0.01
+
+    def test_other_groups_are_none_of_its_weights(self, mesh, counting):
+        obj, _ = mesh
+        obj.vertex_groups.new(name="Wind").add(range(99), 1.0, "REPLACE")
+        counting.renew_counts(obj)
+        assert stale(obj) == ""
+
+    def test_weights_that_the_extension_changes_are_followed_at_once(self, mesh, core):
+        obj, armature = mesh
+        names = [bone.name for bone in armature.data.bones]
+        pose(armature, "Bone.1")
+        part("operators.rigging.weights").write_weights(obj, names, np.tile([0.0, 0.0, 1.0], (len(rest(obj)), 1)))
+        part("operators.deform.live").update(obj)
+        assert stale(obj) == ""
+        bone = armature.pose.bones["Bone.2"]
+        turn = np.array(bone.matrix @ bone.bone.matrix_local.inverted(), np.float64)[:3, :3]
+        assert_allclose(attribute(obj, "lb_moved_disc"), attribute(obj, "lb_disc") @ turn.T, atol=1e-5)
+
     def test_the_modifier_is_to_be_applied_instead(self, mesh):
         obj, _ = mesh
         for tool in (bpy.ops.meshfree.deform_apply, bpy.ops.meshfree.deform_to_shape_key):
