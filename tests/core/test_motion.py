@@ -82,6 +82,37 @@ def test_a_long_implicit_step_of_heat_is_near_the_exponential(monkeypatch):
     np.testing.assert_allclose(after, exact, atol=0.035 * np.abs(modes().eigenvectors).max())
 
 
+@pytest.mark.parametrize("spread", [0.5, 2.0, 6.0])  # in spacings
+def test_heat_of_spots_is_found_around_them(spread):
+    """As everywhere to the accuracy, and left as it is where none arrives."""
+    laplacian = sphere(4000)
+    step = 0.25 * (spread * spacing(laplacian)) ** 2
+    spots = np.linalg.norm(laplacian.points[:, None] - laplacian.points[[0, 1700]], axis=2) < 0.1
+    before = 3.0 + 5.0 * spots
+    exact = core.Heat(laplacian, step).advance(before)
+    after = core.Heat(laplacian, step, accuracy=1e-6).advance(before)
+    assert np.abs(after - exact).max() < 5e-6
+    still = after == 3.0
+    assert still.any(axis=0).all()
+    assert np.abs(exact - 3.0)[still].max() < 5e-6
+    assert (np.abs(exact - before).max(axis=0) > 0.1).all()
+
+
+def test_heat_of_functions_that_vary_everywhere_is_found_everywhere():
+    values = np.column_stack([RNG.random(800), np.ones(800), sphere().points[:, 0]])
+    exact, after = (core.Heat(sphere(), 0.02, accuracy=share).advance(values) for share in (0.0, 1e-3))
+    np.testing.assert_array_equal(after[:, 1], 1.0)
+    np.testing.assert_array_equal(after[:, [0, 2]], exact[:, [0, 2]])
+
+
+def test_heat_of_spots_does_not_cross_to_other_components():
+    laplacian = patchy()
+    before = (laplacian.points[:, 2] > 0.9).astype(float)
+    exact, after = (core.Heat(laplacian, 0.02, accuracy=share).advance(before) for share in (0.0, 1e-6))
+    assert np.abs(after - exact).max() < 1e-6
+    np.testing.assert_array_equal(after[600:1000], 0.0)
+
+
 def test_many_small_steps_of_heat_are_one_large_one():
     values = RNG.random(800)
     after, small = values, core.Heat(sphere(), 0.01)
@@ -329,6 +360,7 @@ NOTHING = np.zeros(800)
         (lambda on: core.Heat(on, 0.0), "step is 0.0. Use a number above zero"),
         (lambda on: core.Heat(on, np.nan), "step is nan"),
         (lambda on: core.Heat(on, True), "step is True"),
+        (lambda on: core.Heat(on, 1.0, accuracy=-1.0), "accuracy is -1.0"),
         (lambda on: core.Heat(on, 1.0).advance(np.zeros(3)), r"shape \(3,\).*one row of real numbers for each of 800"),
         (lambda on: core.Heat(on, 1.0).advance(NOTHING + np.inf), "800 of 800 values are not finite"),
         (lambda on: core.Wave(on, -1.0), "step is -1.0"),

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from numpy.typing import ArrayLike
 
-from ...arguments import positive
+from ...arguments import not_negative, positive
 from ...geometry import check_values
 from ...operator import LaplaceBeltrami
 from ...types import Floats, Progress
@@ -36,13 +36,16 @@ class Heat:
         Of n points; no heat flows across boundaries.
     step : float
         Time of a step [L^2], above zero: a point's heat spreads by about ``2 sqrt(step)``.
+    accuracy : float
+        Error of values, as a share of their range, up to which functions that are constant at most points are left as
+        they are far from the others. That saves most of the time for many functions, each on a few points.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
     Raises
     ------
     PointCloudError
-        A step that is not above zero, or not finite.
+        A step that is not above zero, an accuracy below, or either not finite.
 
     See Also
     --------
@@ -71,10 +74,12 @@ class Heat:
     0.82 0.82
     """
 
-    def __init__(self, laplacian: LaplaceBeltrami, step: float, *, progress: Progress | None = None) -> None:
-        time = positive(step, "step")
+    def __init__(
+        self, laplacian: LaplaceBeltrami, step: float, *, accuracy: float = 0.0, progress: Progress | None = None
+    ) -> None:
+        time, error = positive(step, "step"), not_negative(accuracy, "accuracy")
         self._propagator = Propagator(laplacian, progress)
-        self._spread = self._propagator.heat(time)
+        self._spread = self._propagator.heat(time, error)
 
     def advance(self, state: ArrayLike, *, progress: Progress | None = None) -> Floats:
         """Return the heat one step later.

@@ -19,6 +19,7 @@ from ...algebra import (
     dissect,
     factorize,
     largest_eigenvalue,
+    on_all_cores,
 )
 from ...cores import cores
 from ...errors import InvalidPointsError
@@ -71,18 +72,57 @@ class Propagator:
         # Its eigenvalues lie in [-1, 1], as those of all Chebyshev polynomials of it do.
         self._matrix = ((2.0 / self._top) * matrix - sparse.eye_array(size, format="csr")).tocsr()
 
-    def heat(self, time: float) -> Advance:
-        """Return the step of heat, ``exp(-time * operator)`` [L^2]."""
+    def heat(self, time: float, accuracy: float = 0.0) -> Advance:
+        """Return the step of heat, ``exp(-time * operator)`` [L^2].
+
+        Functions that are constant at most points are advanced where they change, up to an error of their range.
+        """
         if time * self._top > _HEAT:
             return self._implicit_heat(time)
         weights = self._polynomial(lambda eigenvalues: np.exp(-time * eigenvalues))
 
         def advance(rows: Floats, progress: Progress | None) -> Floats:
-            result = rows.copy()
-            result[:, self.order] = self._root * self._combine(weights, rows[:, self.order] / self._root, progress)
+            result, report = rows.copy(), progress or _silent
+
+            def change(number: int) -> bool:
+                values = rows[number, self.order]
+                found = self._around(weights, values, time, accuracy * float(np.ptp(values)))
+                if found is not None:
+                    result[number, self.order[found[0]]] += found[1]
+                return found is not None
+
+            numbers = range(len(rows)) if accuracy else []
+            done = on_all_cores(change, numbers, lambda: report("Step", 0.0))
+            left = np.delete(np.arange(len(rows)), np.flatnonzero(done))
+            if len(left):
+                before = rows[np.ix_(left, self.order)] / self._root
+                result[np.ix_(left, self.order)] = self._root * self._combine(weights, before, progress)
             return self._within(rows, result)
 
         return advance
+
+    def _around(self, weights: Floats, values: Floats, time: float, error: float) -> tuple[Ints, Floats] | None:
+        """Return where a function that is constant at most points changes, and by how much; None for others.
+
+        The points around those that are off the constant are as many as make the heat beyond them no larger than the
+        error: what the heat at the end would carry there in the whole time is no less.
+        """
+        off = values - np.median(values)
+        inside = off != 0.0
+        edge, steps = np.flatnonzero(inside), int(np.ceil(np.sqrt(time * self._top)))  # of a walk in that time
+        while 2 * np.count_nonzero(inside) <= len(inside):
+            for _ in range(steps):
+                reached = np.zeros(len(inside), dtype=bool)
+                reached[self._matrix[edge].indices] = True
+                edge = np.flatnonzero(reached & ~inside)
+                inside[edge] = True
+            steps, rows = 1, np.flatnonzero(inside)
+            near = self._matrix[rows]
+            heat = _sum_of_terms(near[:, rows], weights, off[rows] / self._root[rows])
+            beyond = 0.5 * self._top * self._root * (near.T @ heat)
+            if time * np.abs(beyond[~inside]).max(initial=0.0) <= error:
+                return rows, self._root[rows] * heat - off[rows]
+        return None
 
     def wave(self, time: float, speed: float) -> Advance:
         """Return the step of waves, for displacement and velocity, (2, n)."""
@@ -202,6 +242,18 @@ def read_pair(state: Any, count: int) -> tuple[Floats, bool]:
     except (TypeError, ValueError) as error:
         raise InvalidPointsError(f"The state is no pair: {error}. Give two functions of {count} numbers.") from error
     return np.stack([check_values(values, count, columns=False) for values in (first, second)]), columns
+
+
+def _sum_of_terms(matrix: sparse.csr_array, weights: Floats, start: Floats) -> Floats:
+    """Return the sum of Chebyshev polynomials of a small matrix, each times its weight, on a vector."""
+
+    def product(y: Floats) -> Floats:
+        return np.asarray(matrix @ y)
+
+    result = np.zeros_like(start)
+    for weight, term in zip(weights, chebyshev_terms(product, start), strict=False):
+        result += weight * term
+    return result
 
 
 def _silent(stage: str, fraction: float) -> None:

@@ -132,6 +132,7 @@ def bone_weights(
     result[kept] = _equilibrium(laplacian, kept, heat, near, report)
     lone, leader = followers(laplacian.points, laplacian.component)
     result[lone] = result[leader]
+    np.maximum(result, 0.0, out=result)  # the solution is right to its accuracy only
     return strongest(result / result.sum(axis=1, keepdims=True), most, least)
 
 

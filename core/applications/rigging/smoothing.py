@@ -19,6 +19,7 @@ from .bone_weights import strongest
 from .inpainting import inpaint
 from .touching import apart, without
 
+_ACCURACY = 1e-6  # of weights
 _HELD = 1e12  # times as much heat as others hold points whose weights stay
 
 
@@ -120,9 +121,12 @@ def smooth_weights(
     total = result.sum(axis=1)
     if reach > 0.0 and smoothed.any():
         holding = replace(separate, areas=np.where(some, separate.areas, _HELD * separate.areas))
-        flow = Heat(holding, 0.25 * reach**2, progress=progress)
+        flow = Heat(holding, 0.25 * reach**2, accuracy=_ACCURACY, progress=progress)
         result = result.copy()
-        result[:, smoothed] = flow.advance(result[:, smoothed], progress=progress)
+        moved = flow.advance(result[:, smoothed], progress=progress)
+        left = moved.sum(axis=1)
+        sums = flow.advance(result[:, smoothed].sum(axis=1))  # each function is right to the accuracy only
+        result[:, smoothed] = moved * (sums / np.where(left > 0.0, left, 1.0))[:, None]
     if not smoothed.all():
         result = _shared(np.where(held, given, result), total, smoothed, held)
     loose = ~held
