@@ -177,10 +177,16 @@ def cost():
 
     def measure():
         began = time.process_time()
-        core.bone_weights(laplacian, joints[:-1].reshape(-1, 3), joints[1:].reshape(-1, 3))
+        weights = core.bone_weights(
+            laplacian, joints[:-1].reshape(-1, 3), joints[1:].reshape(-1, 3), influences=4, least=0.01
+        )
+        yield time.process_time() - began
+        began = time.process_time()
+        core.smooth_weights(laplacian, weights, 4.0 * np.sqrt(np.median(laplacian.areas)))
         yield time.process_time() - began
 
-    yield from judge("100,000 points, 60 bones", [Goal("seconds of CPU time", 8.0, "{:.1f}")], measure())
+    goals = [Goal("seconds of CPU time", 8.0, "{:.1f}"), Goal("smoothed, seconds of CPU time", None, "{:.1f}")]
+    yield from judge("100,000 points, 60 bones", goals, measure())
 
 
 GROUPS = {"cat": cat, "pressed": pressed, "elbow": elbow, "cost": cost}

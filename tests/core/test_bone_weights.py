@@ -15,6 +15,13 @@ from tests.core.test_skinning import turned, volume
 GIVEN = np.random.default_rng(4)
 
 
+def touching_balls(count=700):
+    """Two unit balls beside each other that touch, and which points are those of the first."""
+    ball = random_sphere(count)
+    turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    return np.concatenate([ball, ball @ turn + [2.0, 0.0, 0.0]]), np.arange(2 * count) < count
+
+
 def two_bones(points):
     middle, axis, half = axis_of(points)
     return (
@@ -108,6 +115,19 @@ class TestBoneWeights:
         away = np.concatenate([cKDTree(hand).query(hip)[0], cKDTree(hip).query(hand)[0]])
         assert wrong[away > (gap + 2.0) * spacing].max() < 1e-3
         assert np.mean(wrong > 1e-3) < 0.005
+
+    def test_no_bone_reaches_into_a_body_that_touches_at_a_point(self):
+        """Nothing there tells two outsides from one surface, so that the operator's normals of one may be reversed."""
+        points, first = touching_balls()
+        laplacian = core.build_laplacian(points)
+        assert np.einsum("ij,ij->i", laplacian.normals[~first], points[~first] - [2.0, 0.0, 0.0]).mean() < -0.9
+        heads, tails = [[0, 0, -0.5], [2, 0, -0.5]], [[0, 0, 0.5], [2, 0, 0.5]]
+        notices = []
+        weights = core.bone_weights(laplacian, heads, tails, notices=notices)
+        wrong = np.where(first, weights[:, 1], weights[:, 0])
+        assert wrong[np.linalg.norm(points - [1.0, 0.0, 0.0], axis=1) > 0.3].max() < 1e-3
+        assert np.mean(wrong > 1e-3) < 0.005
+        assert notices == []
 
     def test_no_weight_jumps_between_neighbors_where_bones_lie_close_below_the_surface(self):
         points = random_sphere(2000)

@@ -5,6 +5,7 @@ import pytest
 from scipy.special import erf
 
 import core
+from tests.core.test_bone_weights import touching_balls
 
 COLUMNS, ROWS, STEP = 48, 20, 0.1
 
@@ -56,6 +57,16 @@ def test_nothing_flows_between_loose_parts_that_touch(strip, halves):
     assert np.abs(core.smooth_weights(laplacian, halves, 0.5, edges=joined) - halves).max() > 0.3
     loose = core.smooth_weights(laplacian, halves, 0.5, edges=np.empty((0, 2), int))
     assert loose == pytest.approx(core.smooth_weights(laplacian, halves, 0.5), abs=1e-12)
+
+
+def test_little_flows_between_bodies_that_touch_at_a_point():
+    """Where the operator's normals of one are reversed; what flows next to the contact fades from there."""
+    points, first = touching_balls()
+    hard = np.column_stack([first, ~first]).astype(float)
+    change = np.abs(core.smooth_weights(core.build_laplacian(points), hard, 0.3) - hard).max(axis=1)
+    away = np.linalg.norm(points - [1.0, 0.0, 0.0], axis=1)
+    assert change[away > 0.3].max() < 0.06
+    assert change[away > 0.5].max() < 0.015
 
 
 def test_empty_points_of_a_loose_part_are_filled_within_it(strip, halves):

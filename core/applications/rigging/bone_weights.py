@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,7 +19,7 @@ from ...operator import LaplaceBeltrami
 from ...types import Bools, Floats, Ints, Progress
 from ..graph import followers
 from .inside import Inside
-from .touching import apart
+from .touching import apart, outward_normals
 
 _SAME = 1e-3  # of the distance to the nearest bone, within which others are as near
 _ACCURACY = 2e-4  # of the equations: weights are right to 1e-4
@@ -121,6 +122,7 @@ def bone_weights(
         )
     most = int(min(most, len(heads)))
     report("Bones", 0.0)
+    laplacian = replace(laplacian, normals=outward_normals(laplacian))
     kept = np.flatnonzero(laplacian.component >= 0)
     told = _check_extents(laplacian.points, np.concatenate([heads, tails]))
     distance, near, unseen = _seen_bones(laplacian, kept, heads, tails, visible, report)

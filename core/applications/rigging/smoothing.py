@@ -17,7 +17,7 @@ from ...types import Bools, Floats, Progress
 from ..motion.motion import Heat
 from .bone_weights import strongest
 from .inpainting import inpaint
-from .touching import apart, without
+from .touching import apart, outward_normals, without
 
 _ACCURACY = 1e-6  # of weights
 _HELD = 1e12  # times as much heat as others hold points whose weights stay
@@ -152,7 +152,7 @@ def _check_weights(weights: ArrayLike, count: int) -> Floats:
 
 def _separated(laplacian: LaplaceBeltrami, edges: ArrayLike | None) -> LaplaceBeltrami:
     """Return the operator without pairs of sheets that touch, or of loose parts of a mesh."""
-    stiffness, _ = apart(laplacian.stiffness, laplacian.normals, laplacian.trust)
+    stiffness, _ = apart(laplacian.stiffness, outward_normals(laplacian), laplacian.trust)
     if edges is not None:
         count = len(laplacian.points)
         ends = check_array(edges, "Edges", [(None, 2)], "Give two points for each.", "iu").astype(np.int64)
