@@ -84,8 +84,8 @@ def _count_changed(obj, shown, own):
     by_nodes = obj.type == "MESH" and (shown.points or shown.instances)
     advice = _advice(shown) if by_nodes else ["Apply these modifiers"]
     return (
-        f'The modifiers of "{obj.name}" change its {point_count(obj.data)} points to {shown if by_nodes else own}, so'
-        f" results cannot be written. {', or '.join(advice)}, or turn off Use Modifiers."
+        f'The modifiers of "{obj.name}" change its {point_count(obj.data)} points to {shown if by_nodes else own}, for'
+        f" which it holds no data. {', or '.join(advice)}, or turn off Use Modifiers."
     )
 
 

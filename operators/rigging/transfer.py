@@ -49,11 +49,14 @@ class Match(NamedTuple):
     places : SurfaceMatch
     state : ndarray, (n,) int
         The number of a name of the result `TRANSFER`.
+    notices : list of str
+        About surfaces whose sheets are hardly told apart.
     """
 
     laplacian: Any
     places: Any
     state: np.ndarray
+    notices: list
 
     def share(self, state) -> float:
         """Return the share of the points in a state."""
@@ -161,7 +164,9 @@ class Transfer(Tool):
                     " agree. Move the objects onto each other, or raise Distance or Angle."
                 )
             reached = np.isin(laplacian.component, laplacian.component[places.known])
-            return Match(laplacian, places, np.where(places.known, _TAKEN, np.where(reached, _FILLED, _FAR)))
+            state = np.where(places.known, _TAKEN, np.where(reached, _FILLED, _FAR))
+            each = zip([*(source.name for source in sources), name], [*laplacians, laplacian], strict=True)
+            return Match(laplacian, places, state, [text for named in each for text in _close_sheets(*named)])
 
         return reading, find
 
@@ -179,7 +184,17 @@ class Transfer(Tool):
             f"Points of parts of {obj.name} of which none is near the source: {far:,}. They have the values of the"
             " nearest point that is. Raise Distance, or move the objects onto each other."
         ]
-        return [*(notices if far else ()), line]
+        return [*(notices if far else ()), *match.notices, line]
+
+
+def _close_sheets(name, laplacian) -> list:
+    """Return a notice of the points of an object between whose sheets values may get across."""
+    causes = core.Doubt
+    count = np.count_nonzero(laplacian.doubt == causes.SHEETS)
+    return [
+        f"Sheets of {name} are as close to each other as its points are, at {count:,} of them. Values may get from one"
+        " sheet to the other there. Add points, or transfer each sheet alone."
+    ][: min(count, 1)]
 
 
 def sides(context, reverse):

@@ -150,9 +150,9 @@ class TestUseModifiers:
     @pytest.mark.parametrize(
         ("parts", "reason"),
         [
-            (("points", "points"), "to 800 points, so.* node Points to Vertices at the end of the nodes and apply"),
-            (("cubes",), "to 3,200 points of instances, so.* node Realize Instances at the end of the nodes"),
-            (("nothing",), "to 0, so results cannot be written. Apply these modifiers, or turn off Use Modifiers"),
+            (("points", "points"), "to 800 points, for.* node Points to Vertices at the end of the nodes and apply"),
+            (("cubes",), "to 3,200 points of instances, for.* node Realize Instances at the end of the nodes"),
+            (("nothing",), "to 0, for which it holds no data. Apply these modifiers, or turn off Use Modifiers"),
         ],
     )
     def test_more_or_fewer_have_no_place_for_results(self, obj, parts, reason):

@@ -96,6 +96,23 @@ def test_parts_that_are_far_are_told_of(pair, capfd):
     assert "none is near the source: 400" in capfd.readouterr().out
 
 
+def test_sheets_that_are_hardly_told_apart_are_told_of(pair, capfd):
+    """Two shells around each other, 1.2 spacings apart, as a source and as a target; single shells are not."""
+    source, _ = pair
+    bpy.ops.meshfree.transfer_weights()
+    assert "Sheets of" not in capfd.readouterr().out
+    shells = np.concatenate([sphere_points(900), 1.14 * sphere_points(900, 1)])
+    both = add_object(shells, "Shells")
+    choose(source, both)
+    bpy.ops.meshfree.transfer_weights()
+    told = capfd.readouterr().out
+    assert "Sheets of Shells are as close to each other as its points are, at" in told
+    assert "Sheets of Source" not in told
+    choose(both, source)
+    bpy.ops.meshfree.transfer_weights(preview=True)
+    assert "Sheets of Shells" in capfd.readouterr().out
+
+
 def test_preview_writes_colors_alone(pair, extension):
     _, target = pair
     assert bpy.ops.meshfree.transfer_weights(preview=True) == {"FINISHED"}
@@ -271,6 +288,16 @@ class TestRefused:
         target.location.x = 9.0
         bpy.context.view_layer.update()
         with refused(target, 'No point of "Target" lies within'):
+            bpy.ops.meshfree.transfer_weights()
+
+    def test_modifiers_of_the_source_that_change_its_points(self, pair):
+        source, target = pair
+        mask = source.modifiers.new("Mask", "MASK")
+        mask.vertex_group = "lower"
+        bpy.ops.meshfree.transfer_weights()  # as modifiers are not used, its own vertices count
+        target.vertex_groups.clear()
+        source.meshfree.use_modifiers = True
+        with refused(target, 'modifiers of "Source" change its 900 points to .* or turn off Use Modifiers'):
             bpy.ops.meshfree.transfer_weights()
 
     def test_attributes_of_these_names(self, pair):
