@@ -1,10 +1,8 @@
 """Points that follow an armature, with real keys: weights, one undo, and a pose."""
 
-from pathlib import Path
-
+from tests.gui.test_follow import ARMATURES, select
 from tests.gui.test_play import finish
 
-ARMATURES = (Path(__file__).parents[1] / "blender" / "armatures.py").read_text(encoding="utf-8")  # run inside Blender
 CLOUD = """
 obj = add_object(sphere_points(1500) * (0.5, 0.5, 3.0))
 armature = add_armature({"lower": ((0, 0, -2.5), (0, 0, 0)), "upper": ((0, 0, 0), (0, 0, 2.5))})
@@ -48,13 +46,7 @@ def test_a_bone_that_is_turned_in_pose_mode_takes_its_points_along(gui):
     gui.point_at_view()
     gui.key("KP_1", "ctrl+Tab")
     gui.wait_until("bpy.context.mode == 'POSE'")
-    gui.python("bones = bpy.context.object.data.bones; bones.active = bones['upper']")
-    gui.key("alt+a")
-    if gui.python("hasattr(bpy.context.object.pose.bones['upper'], 'select')"):  # Blender 5.0 on
-        gui.python("bpy.context.object.pose.bones['upper'].select = True")
-    else:
-        gui.python("bpy.context.object.data.bones['upper'].select = True")
-    gui.point_at_view()
+    select(gui, "upper")
     gui.key("r", "3", "0", "Return")
     gui.settle()
     top, bottom = gui.python(SHIFTS)
