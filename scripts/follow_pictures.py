@@ -40,7 +40,9 @@ POSE = {  # turns about world axes, in degrees
 }
 LIGHT = np.array([-0.4, -0.7, 0.6])
 ORANGE = np.array([0.9, 0.45, 0.15])
+SLATE = (0.1, 0.22, 0.33, 1.0)
 VIEW = (0.25, -1.0, 0.12)
+COARSE = 0.5  # edges of the mesh for each spacing of the points
 FRAMES, WAVING = 12, 20_000  # of the loop, and splats in it
 
 
@@ -87,44 +89,74 @@ def as_splats(points, laplacian):
     return bpy.context.object
 
 
+def select(*objects):
+    """Select objects, the last one active."""
+    for other in bpy.context.view_layer.objects:
+        other.select_set(other in objects)
+    studio.activate(objects[-1])
+
+
 def rigged(*objects):
     """Let objects follow an armature for the armadillo; return it."""
     rig = armature()
-    for other in bpy.context.view_layer.objects:
-        other.select_set(other in (*objects, rig))
-    bpy.context.view_layer.objects.active = rig
+    select(*objects, rig)
     bpy.ops.meshfree.auto_weights(at_once=True)
     for obj in objects:
         obj.meshfree.deform.preserve_volume = True
     return rig
 
 
+def as_mesh(scan):
+    """Add a mesh of a scan, with a quarter of its points, and leave the scan to be seen."""
+    studio.activate(scan)
+    bpy.ops.meshfree.mesh_surface(detail=COARSE)
+    mesh = bpy.context.object
+    scan.hide_set(False)
+    scan.hide_render = False
+    mesh.data.materials.clear()
+    mesh.data.materials.append(studio.paint("Slate", SLATE))
+    return mesh
+
+
+def transferred(mesh, source, rig):
+    """Let a mesh follow an armature by the weights of other points."""
+    select(mesh, source)
+    bpy.ops.meshfree.transfer_weights(show=False)
+    select(mesh, rig)
+    bpy.ops.object.parent_set(type="ARMATURE")
+    mesh.modifiers["Armature"].use_deform_preserve_volume = True
+
+
 def bind_armature(path):
-    """The armadillo at rest, and as a point cloud and as splats in the pose of an armature."""
+    """The armadillo at rest, and in the pose of an armature: as a point cloud, as splats, and as a mesh."""
     core = studio.part("core")
     rest, obj = scan_pictures.scan("armadillo", copies=2)
+    mesh = as_mesh(rest)
     for each in (rest, obj):
-        studio.activate(each)
+        select(each)
         bpy.ops.meshfree.analyze(show=False)
         studio.show(each, "lb_mean_curvature")
-    studio.activate(obj)
     bpy.ops.meshfree.convert()
     obj = bpy.context.object
     points = studio.world_points(obj)
     splats = as_splats(points, core.build_laplacian(points))
     rig = rigged(obj, splats)
+    transferred(mesh, obj, rig)
     for name, angles in POSE.items():
         turn(rig, name, angles)
-    for each in (obj, splats):
-        studio.activate(each)
-        bpy.ops.meshfree.deform_update()
-        bpy.ops.meshfree.deform_apply()
+    for each in (obj, splats, mesh):
+        select(each)
+        if each is mesh:
+            bpy.ops.object.modifier_apply(modifier="Armature")
+        else:
+            bpy.ops.meshfree.deform_update()
+            bpy.ops.meshfree.deform_apply()
         place = each.matrix_world.copy()
         each.parent = None
         each.matrix_world = place
     bpy.data.objects.remove(rig)
     bpy.context.view_layer.update()
-    studio.row([rest, obj, splats], path, legend=None, view=VIEW, size=(1000, 340))
+    studio.row([rest, obj, splats, mesh], path, legend=None, view=VIEW, size=(1000, 300))
 
 
 def rig_wave(path):
