@@ -7,6 +7,7 @@ from .las_choices import LasChoices, parse_classes
 from .lines import brief
 from .mesh import MESHES, write_mesh
 from .origin import choose_origin, is_coarse
+from .pieces import Chunks, Extent, chunks, extent, has_levels, join_pieces
 from .ply import PlyVertices, read_elements, read_vertex_columns, read_vertex_names, write_vertex_columns
 from .rows import unpacks_too_far
 from .table import FARTHEST, SCANNER, PointTable, check_places, split_columns, unit_colors

@@ -3,6 +3,7 @@
 import itertools
 import os
 import struct
+from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 from xml.etree.ElementTree import Element, TreeBuilder
@@ -56,24 +57,35 @@ def read_e57(path: Path) -> PointTable:
     InvalidPointsError
         It is no E57 file, or broken; the text says where.
     """
+    notices: list[str] = []
+    tables = [*e57_scans(path, notices)]
+    table = _join(tables) if tables else PointTable(np.empty((0, 3)))
+    table.notices += notices
+    return table
+
+
+def e57_scans(path: Path, notices: list[str]) -> Iterator[PointTable]:
+    """Yield the points of each scan as of `read_e57`; the notices get what was left out, at the end."""
     with open(path, "rb") as file:
         scans = [scan for scan in _find_scans(file, path) if scan.count]
+        total = sum(scan.count for scan in scans)
         values = sum(scan.count * max(len(scan.fields), 3) for scan in scans)
         if unpacks_too_far(8 * values, os.fstat(file.fileno()).st_size):  # constant fields take no bytes of the file
-            count = sum(scan.count for scan in scans)
-            raise InvalidPointsError(f"{path} is too short for the {count:,} points that it names. Copy it again.")
-        places = [place_of(scan.offset) for scan in scans]
+            raise InvalidPointsError(f"{path} is too short for the {total:,} points that it names. Copy it again.")
+        places, missed = [place_of(scan.offset) for scan in scans], total
         # The same bytes are read for one scan only, or a small file could name them many times.
         ends = dict(reversed([*itertools.pairwise([*sorted(places), np.inf])]))
-        tables = [_read_scan(file, place, ends[place], scan, path) for place, scan in zip(places, scans, strict=True)]
-    table = _join(tables) if tables else PointTable(np.empty((0, 3)))
+        for index, (place, scan) in enumerate(zip(places, scans, strict=True)):
+            table = _read_scan(file, place, ends[place], scan, path)
+            missed -= len(table.points)
+            if len(scans) > 1:
+                table.attributes["scan"] = np.full(len(table.points), index, np.int32)
+            yield table
     texts = {field.name: None for scan in scans for field in scan.fields if field.kind == "String"}
     if texts:
-        table.notices.append(f"{path.name}: left out {brief(', '.join(texts))}, which holds no numbers.")
-    missed = sum(scan.count for scan in scans) - len(table.points)
+        notices.append(f"{path.name}: left out {brief(', '.join(texts))}, which holds no numbers.")
     if missed:
-        table.notices.append(f"{path.name}: left out {missed} points that the scanner marked as invalid.")
-    return table
+        notices.append(f"{path.name}: left out {missed} points that the scanner marked as invalid.")
 
 
 def _find_scans(file: BinaryIO, path: Path) -> list[_Scan]:
@@ -234,8 +246,6 @@ def _join(tables: list[PointTable]) -> PointTable:
     """Return one table of several, whose columns are removed; attributes that a scan lacks are zero, colors white."""
     if len(tables) == 1:
         return tables[0]
-    for index, table in enumerate(tables):
-        table.attributes["scan"] = np.full(len(table.points), index, np.int32)
     likes = {name: values[:0] for table in tables for name, values in table.attributes.items()}
     result = PointTable(
         np.concatenate([table.points for table in tables]), single=any(table.single for table in tables)

@@ -86,11 +86,11 @@ def read_points(path: Path, columns: str = "", las: LasChoices = LasChoices()) -
         given = {"columns": columns} if columns.strip() else {"las": las} if suffix in SCANS else {}
         table = without_missed(_READERS[suffix](path, **given), path)
     check_places(table.points, path)
-    table.notices += _doubts(table, path)
+    table.notices += doubts(table, path)
     return table
 
 
-def _doubts(table: PointTable, path: Path) -> Iterator[str]:
+def doubts(table: PointTable, path: Path) -> Iterator[str]:
     """Yield notices about units and precision of the coordinates of a table."""
     units = np.ones(3)
     if table.degrees or look_like_degrees(table.points):

@@ -1,38 +1,98 @@
-"""LAS and LAZ, the files of laser scanners: by laspy and lazrs, imported only here."""
+"""LAS and LAZ, the files of laser scanners: by laspy and lazrs, which are imported only as such files are read."""
 
-import os
-import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
-from ..errors import InvalidPointsError, PointCloudError, TooFewPointsError
-from ..types import Array, Bools
+from ..errors import PointCloudError, TooFewPointsError
+from ..types import Array, Bools, Floats
+from .copc import Box, Octree, read_octree, records_of
 from .las_choices import LasChoices
-from .rows import too_short, unpacks_too_far
-from .table import PointTable, depth_notices, unit_colors
+from .las_packing import PackedChunk, check_header, check_size
+from .rows import too_short
+from .table import CHANNELS, PointTable, color_by
 
-_TIMES = "gps_time"
-_COLUMNS = ("intensity", "classification", "return_number", "nir", _TIMES)  # that become attributes, if they exist
-_COLORS = ("red", "green", "blue")
+TIMES = "gps_time"
+_COLUMNS = ("intensity", "classification", "return_number", "nir", TIMES)  # that become attributes, if they exist
+_COLORS = CHANNELS[:3]
+_WITHHELD = "withheld"
+_NUMBERS = (1, 3)  # of a column that becomes an attribute
 _BLOCK = 2**16  # points that are read at once
-_SHORTEST = 227  # bytes of a header
-
-_DETAIL = 54  # bytes of a variable length record at least
-_CHUNKED, _LAYERED = 2, 3  # kinds of compression
-# Items of a compressed point by number: bytes, and layers if there are any. Others are extra bytes, a layer for each.
-_ITEMS = {6: (20, 0), 7: (8, 0), 8: (6, 0), 9: (29, 0), 10: (30, 9), 11: (6, 1), 12: (8, 2), 13: (29, 1)}
-_EXTRA = (0, 14)
 _CLASSES = 256
 _MOST_DEGREES = 360.0
 _GEOGRAPHIC = (1024, 2)  # key of GeoTIFF and its value
 
 
-def read_las(path: Path, las: LasChoices = LasChoices()) -> PointTable:
-    """Read a LAS or LAZ file: coordinates, intensity, class, return, colors and extra dimensions.
+class LasFile(NamedTuple):
+    """An open file.
 
-    Points that are flagged as withheld are left out, unless they are chosen, as are those of classes that are not.
+    Attributes
+    ----------
+    path : pathlib.Path
+    file : file object
+    reader : laspy.LasReader
+        At the first point.
+    chunks : list of PackedChunk
+        Of compressed points.
+    """
+
+    path: Path
+    file: BinaryIO
+    reader: Any
+    chunks: list[PackedChunk]
+
+    @property
+    def octree(self) -> Octree | None:
+        """The nodes of a cloud optimized file; None of another one."""
+        return read_octree(self.file, self.chunks, self.path)
+
+    def places(self, block: Any, kept: Bools | slice = slice(None)) -> Floats:
+        """Return the coordinates of points, (n, 3)."""
+        header = self.reader.header
+        columns = [block[name][kept] * header.scales[axis] + header.offsets[axis] for axis, name in enumerate("XYZ")]
+        return np.stack(columns, axis=1)
+
+    def names(self, withheld: bool = False) -> list[str]:
+        """Return the names of the other numbers of a point, those of the flag among them if it is asked for."""
+        return [*self._sources(withheld)]
+
+    def columns(self, block: Any, kept: Bools | slice, withheld: bool = False) -> dict[str, Array]:
+        """Return the other numbers of points by name: red, green and blue, and those that become attributes."""
+        columns = {name: np.asarray(block[source])[kept] for name, source in self._sources(withheld).items()}
+        if withheld:
+            columns[_WITHHELD] = columns[_WITHHELD].astype(np.uint8)
+        return columns
+
+    def _sources(self, withheld: bool) -> dict[str, str]:
+        """Return laspy's names of what is read, by ours."""
+        layout = self.reader.header.point_format
+        known = set(layout.dimension_names)
+        extra = [item.name for item in layout.extra_dimensions if item.num_elements in _NUMBERS]
+        names = [*(_COLORS if known.issuperset(_COLORS) else ()), *(name for name in _COLUMNS if name in known), *extra]
+        sources = {" ".join(name.split()) or "extra": name for name in names}
+        return {**sources, _WITHHELD: _WITHHELD} if withheld else sources
+
+    def left_out(self) -> list[str]:
+        """Report the columns that are not read."""
+        extra = self.reader.header.point_format.extra_dimensions
+        return [
+            f"{self.path.name}: left out {item.name}, which has {item.num_elements} numbers per point."
+            for item in extra
+            if item.num_elements not in _NUMBERS
+        ]
+
+    def is_geographic(self, points: Floats) -> bool:
+        """Whether coordinates, (n, 3), are longitude and latitude: the file states it, and they are not too large."""
+        near = bool(np.abs(points[:, :2]).max(initial=0.0) <= _MOST_DEGREES)
+        return near and _is_geographic(self.reader.header)
+
+
+@contextmanager
+def opened_las(path: Path) -> Iterator[LasFile]:
+    """Open a LAS or LAZ file.
 
     Raises
     ------
@@ -47,176 +107,138 @@ def read_las(path: Path, las: LasChoices = LasChoices()) -> PointTable:
             f"{path} cannot be read: {error.name} is missing. Install laspy and lazrs, or export the points as PLY."
         ) from error
     with open(path, "rb") as file:
-        _check_header(file, path)
+        check_header(file, path)
         try:
             # Not in parallel: that takes memory for as many points as a file names in a chunk.
             with laspy.open(file, closefd=False, read_evlrs=False, laz_backend=laspy.LazBackend.Lazrs) as reader:
-                _check_size(file, reader.header, path)
-                return _read(reader, path, las)
+                chunks = check_size(file, reader.header, path)
+                yield LasFile(path, file, reader, chunks)
         except (laspy.errors.LaspyException, lazrs.LazrsError) as error:
             raise ValueError(f"{error}") from error  # `read_points` reports it as numpy's
 
 
-def _check_header(file: BinaryIO, path: Path) -> None:
-    """Refuse files that are not LAS, or state more records than fit: laspy would search them all."""
-    size = os.fstat(file.fileno()).st_size
-    data = file.read(_SHORTEST)
-    if len(data) < _SHORTEST or data[:4] != b"LASF":
-        raise InvalidPointsError(f"{path} is no LAS file: it does not begin with the header of one. Export it again.")
-    length, begin, details = struct.unpack_from("<HII", data, 94)
-    if length + details * _DETAIL > begin or begin > size:
-        raise InvalidPointsError(
-            f"{path} is shorter than its header states: {details} records before byte {begin:,} of {size:,}. Copy it"
-            " again."
-        )
-    file.seek(0)
+def read_las(path: Path, las: LasChoices = LasChoices()) -> PointTable:
+    """Read a LAS or LAZ file: coordinates, intensity, class, return, colors and extra dimensions.
 
+    Points that are flagged as withheld are left out, unless they are chosen, as are those of classes that are not.
 
-def _check_size(file: BinaryIO, header: Any, path: Path) -> None:
-    """Refuse a file that is too short for its points, before there is memory for them."""
-    begin, size = header.offset_to_point_data, os.fstat(file.fileno()).st_size
-    needed = header.point_count * header.point_format.size
-    if unpacks_too_far(needed, size) if header.are_points_compressed else needed > size - begin:
-        raise InvalidPointsError(
-            f"{path} is shorter than the {header.point_count:,} points that its header states. Copy it again."
-        )
-    if header.are_points_compressed and header.point_count:
-        _check_packing(file, begin, size, header, path)
-        file.seek(begin)
-
-
-def _check_packing(file: BinaryIO, begin: int, size: int, header: Any, path: Path) -> None:
-    """Refuse compressed points whose chunks are longer than the file.
-
-    lazrs allocates memory for whatever a file states, and aborts the whole program where there is too little.
+    Raises
+    ------
+    PointCloudError
+        laspy or lazrs is missing, or the file is broken.
     """
-    import lazrs
-
-    found = [detail.record_data for detail in header.vlrs.get("LasZipVlr")]
-    kind, items = (0, []) if not found else _read_items(found[0])
-    wanted = [size for number, size in items if number in _ITEMS and _ITEMS[number][0] != size]
-    if (
-        kind not in (_CHUNKED, _LAYERED)
-        or wanted
-        or sum(size for _, size in items) != header.point_format.size
-        or any(number not in _ITEMS and number not in _EXTRA for number, _ in items)
-    ):
-        raise InvalidPointsError(f"{path} uses an unknown compression, or is corrupted. Save it again as LAS.")
-    fault = InvalidPointsError(f"{path} is broken: its compressed points do not match its header. Copy it again.")
-
-    def read(code: str, place: int) -> tuple[int, ...]:
-        length = struct.calcsize(code)
-        if not begin <= place <= size - length:
-            raise fault
-        file.seek(place)
-        return struct.unpack(code, file.read(length))
-
-    (end,) = read("<q", begin)
-    if end == -1:  # of programs that write sequentially
-        (end,) = read("<q", size - 8)
-    _, chunks = read("<II", end)
-    if (chunks - 1) * header.point_format.size > end - begin - 8:  # each begins with a whole point, if it has any
-        raise fault
-    file.seek(begin)
-    place, left = begin + 8, header.point_count
-    layers = sum(_ITEMS[number][1] if number in _ITEMS else length for number, length in items)
-    for count, length in lazrs.read_chunk_table(file, lazrs.LazVlr(found[0])):
-        if left <= 0:
-            break  # writers may begin a chunk at the end that gets no points
-        if not 0 <= length <= end - place:
-            raise fault
-        if kind == _LAYERED:
-            head = header.point_format.size + 4 * (1 + layers)
-            if length < head or sum(read(f"<{layers}I", place + head - 4 * layers)) != length - head:
-                raise fault
-        place, left = place + length, left - count
-    if left > 0:
-        raise fault
-
-
-def _read_items(data: bytes) -> tuple[int, list[tuple[int, ...]]]:
-    """Return the kind of compression, and number and bytes of each item of a point."""
-    (kind,), (count,) = struct.unpack_from("<H", data), struct.unpack_from("<H", data, 32)
-    return kind, [struct.unpack_from("<HH", data, 34 + 6 * index) for index in range(count)]
-
-
-def _read(reader: Any, path: Path, choices: LasChoices) -> PointTable:
-    """Read the points block by block."""
-    header = reader.header
-    count, known = header.point_count, set(header.point_format.dimension_names)
-    names = [name for name in (*_COLUMNS, *header.point_format.extra_dimension_names) if name in known]
-    table, tally = PointTable(np.empty((count, 3))), _Tally(choices)
-    colors = np.empty((count, 3), np.uint16) if known.issuperset(_COLORS) else None
-    done = 0
-    for block in reader.chunk_iterator(_BLOCK):
-        kept = tally.keep(block)
-        for axis, name in enumerate("XYZ"):
-            values = block[name][kept] * header.scales[axis] + header.offsets[axis]
-            rows = slice(done, done + len(values))
-            table.points[rows, axis] = values
-        if colors is not None:
-            for axis, name in enumerate(_COLORS):
-                colors[rows, axis] = block[name][kept]
-        for name in names:
-            values = np.asarray(block[name])
-            if values.shape[1:] in ((), (3,)):
-                _put(table, " ".join(name.split()) or "extra", rows, values[kept], count)
-            elif done == 0:
-                table.notices.append(f"{path.name}: left out {name}, which has {values.shape[1]} numbers per point.")
-        if choices.withheld:
-            _put(table, "withheld", rows, np.asarray(block["withheld"])[kept].astype(np.uint8), count)
-        done = rows.stop
-    if tally.total < count:
-        raise too_short(path, tally.total, count)
-    table.notices += tally.notices(path, done)
-    if done < count:
-        table.points = table.points[:done]
-        table.attributes = {name: values[:done] for name, values in table.attributes.items()}
-    if not table.attributes.get(_TIMES, np.ones(1)).any():  # some programs write zeros where they have none
-        del table.attributes[_TIMES]
-    if colors is not None and colors[:done].any():  # scanners without a camera write black
-        table.colors = unit_colors(colors[:done])
-        table.notices += depth_notices(colors[:done], path)
-    table.degrees = np.abs(table.points[:, :2]).max(initial=0.0) <= _MOST_DEGREES and _is_geographic(header)
+    with opened_las(path) as file:
+        count, tally, done = file.reader.header.point_count, Tally(las), 0
+        table = PointTable(np.empty((count, 3)), notices=file.left_out())
+        for points, columns in las_pieces(file, tally, _BLOCK):
+            rows = slice(done, done + len(points))
+            table.points[rows] = points
+            for name, values in columns.items():
+                _put(table, name, rows, values, count)
+            done = rows.stop
+        table.notices += tally.notices(path)
+        tally.refuse_none(path)
+        if done < count:
+            table.points = table.points[:done]
+            table.attributes = {name: values[:done] for name, values in table.attributes.items()}
+        if not table.attributes.get(TIMES, np.ones(1)).any():  # some programs write zeros where they have none
+            del table.attributes[TIMES]
+        channels = {name: table.attributes.pop(name) for name in _COLORS if name in table.attributes}
+        if any(values.any() for values in channels.values()):  # scanners without a camera write black
+            color_by(table, channels, path)
+        table.degrees = file.is_geographic(table.points)
     return table
 
 
-class _Tally:
-    """Selects the points that are read, and counts those of each class."""
+def las_pieces(
+    file: LasFile, tally: "Tally", size: int, box: Box | None = None, level: int | None = None
+) -> Iterator[tuple[Floats, dict[str, Array]]]:
+    """Yield coordinates and other numbers of points, piece by piece.
+
+    Parameters
+    ----------
+    file : LasFile
+    tally : Tally
+        Chooses and counts points.
+    size : int
+        Of a piece at most; but nodes of an octree are read whole.
+    box : tuple of two ndarray, (3,), optional
+        Its lowest and highest corner. Nothing is read that by header or octree is outside; other points may be.
+    level : int, optional
+        The last level of an octree that is read.
+    """
+    header = file.reader.header
+    if box is not None and ((header.maxs < box[0]) | (header.mins > box[1])).any():
+        return
+    whole = box is None and level is None
+    octree = None if whole else file.octree
+    if octree is None:
+        blocks = file.reader.chunk_iterator(size)
+    else:
+        blocks = records_of(file.file, header, octree.nodes(box, level), size)
+    for block in blocks:
+        kept = tally.keep(block)
+        points = file.places(block, kept)
+        if len(points):
+            yield points, file.columns(block, kept, tally.choices.withheld)
+    if octree is None and tally.total < header.point_count:
+        raise too_short(file.path, tally.total, header.point_count)
+
+
+class Tally:
+    """Selects the points that are read, and counts those of each class.
+
+    Parameters
+    ----------
+    choices : LasChoices
+    """
 
     def __init__(self, choices: LasChoices) -> None:
-        self._choices = choices
+        self.choices = choices
         self.total = self._withheld = 0
         self._found = np.zeros(_CLASSES, int)  # but withheld ones, unless these are read
 
     def keep(self, block: Any) -> Bools | slice:
         """Return which points of a block are read, as an index."""
         withheld, classes = np.asarray(block["withheld"]).astype(bool), np.asarray(block["classification"])
-        kept = ~withheld | self._choices.withheld
+        kept = ~withheld | self.choices.withheld
         self.total += len(kept)
         self._withheld += int(np.count_nonzero(withheld))
         self._found += np.bincount(classes[kept], minlength=_CLASSES)
-        if self._choices.classes:
-            kept &= np.isin(classes, [*self._choices.classes])
+        if self.choices.classes:
+            kept &= np.isin(classes, [*self.choices.classes])
         return slice(None) if kept.all() else kept
 
-    def notices(self, path: Path, count: int) -> list[str]:
-        """Report which points were left out, where this many are read; refuse a file of which none is left."""
-        others, result = self._found.sum() - count, []
-        if self._withheld and self._choices.withheld:
+    @property
+    def _others(self) -> int:
+        """Points of other classes than those chosen."""
+        chosen = [*self.choices.classes] or slice(None)
+        return int(self._found.sum() - self._found[chosen].sum())
+
+    def notices(self, path: Path) -> list[str]:
+        """Report which points were left out."""
+        result = []
+        if self._withheld and self.choices.withheld:
             result.append(f"{path.name}: {self._withheld} points are withheld, which means deleted; they are kept.")
         elif self._withheld:
-            withheld = f"{self._withheld} withheld points, which means deleted. Withheld Points keeps them."
-            if not count and not others:
-                raise TooFewPointsError(f"{path} has no points but {withheld}")
-            result.append(f"{path.name}: left out {withheld}")
-        if others and not count:
-            there = ", ".join(f"{number} ({self._found[number]:,} points)" for number in np.flatnonzero(self._found))
-            wanted = ", ".join(map(str, sorted(self._choices.classes)))
-            raise TooFewPointsError(f"{path} has no points of the classes {wanted}. Choose some of {there}.")
-        if others:
-            result.append(f"{path.name}: left out {others} points of other classes than those chosen.")
+            result.append(f"{path.name}: left out {self._withheld_text}")
+        if self._others:
+            result.append(f"{path.name}: left out {self._others} points of other classes than those chosen.")
         return result
+
+    @property
+    def _withheld_text(self) -> str:
+        return f"{self._withheld} withheld points, which means deleted. Withheld Points keeps them."
+
+    def refuse_none(self, path: Path) -> None:
+        """Refuse a file of whose points none is left."""
+        if not self.total or self._found.sum() > self._others:
+            return
+        if not self._others:
+            raise TooFewPointsError(f"{path} has no points but {self._withheld_text}")
+        there = ", ".join(f"{number} ({self._found[number]:,} points)" for number in np.flatnonzero(self._found))
+        wanted = ", ".join(map(str, sorted(self.choices.classes)))
+        raise TooFewPointsError(f"{path} has no points of the classes {wanted}. Choose some of {there}.")
 
 
 def _put(table: PointTable, name: str, rows: slice, values: Array, count: int) -> None:

@@ -1,6 +1,6 @@
 """PLY, the Stanford polygon format: the vertices and their properties, in text or binary."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
@@ -12,8 +12,8 @@ from .ascii_words import ascii_words
 from .lines import brief
 from .ply_lists import Code, end_of_records, read_fixed
 from .polygons import triangles
-from .rows import read_records, read_rows
-from .table import PointTable, from_columns, to_columns
+from .rows import read_records, read_rows, record_blocks
+from .table import PointTable, from_columns, gather_columns, to_columns
 
 _CODES = ("i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8")
 _NAMES = dict(zip(_CODES, ("char", "uchar", "short", "ushort", "int", "uint", "float", "double"), strict=True))
@@ -80,19 +80,59 @@ def read_ply(path: Path) -> PointTable:
 def read_vertex_columns(path: Path) -> PlyVertices:
     """Read the vertices of a PLY file in its types; errors as of `read_ply`."""
     with open(path, "rb") as file:
-        order, elements, comments = _read_header(file, path)
-        names = [element.name for element in elements]
-        if "vertex" not in names:
-            raise InvalidPointsError(
-                f"{path} has no vertices, only {brief(', '.join(names)) or 'nothing'}. It holds no points."
-            )
-        vertex = elements[names.index("vertex")]
-        before = [element for element in elements[: names.index("vertex")] if element.count]
+        order, before, vertex, comments, notices = _read_vertex(file, path)
         if order is None:
             columns = read_rows(file, vertex.codes, vertex.count, path, sum(element.count for element in before))
         else:
             columns = _read_binary(file, order, before, vertex, path)
     single = [name for name in vertex.names if name not in vertex.lists]
+    return PlyVertices(dict(zip(single, columns, strict=True)), order, comments, notices)
+
+
+def ply_pieces(path: Path, size: int, notices: list[str]) -> Iterator[tuple[PointTable, dict[str, Array]]] | None:
+    """Yield the vertices of a binary PLY file, so many at once, as `gather_columns` makes them.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+    size : int
+    notices : list of str
+        Gets what is left out.
+
+    Returns
+    -------
+    iterator of (PointTable, dict of str to ndarray), or None
+        None where the file can only be read as a whole: it is text, or has lists at its vertices.
+    """
+    with open(path, "rb") as file:
+        order, before, vertex, _, found = _read_vertex(file, path)
+        if order is None or vertex.lists:
+            return None
+        begin = _end(file, order, before, path)
+    notices += found
+    return _vertex_pieces(path, begin, order, vertex, size)
+
+
+def _vertex_pieces(
+    path: Path, begin: int, order: str, vertex: _Element, size: int
+) -> Iterator[tuple[PointTable, dict[str, Array]]]:
+    codes = [str(code) for code in vertex.types]
+    record = _record(order, codes)
+    with open(path, "rb") as file:
+        for rows in record_blocks(file, begin, record, vertex.count, path, size):
+            yield gather_columns(dict(zip(vertex.names, _columns(rows, codes), strict=True)), path)
+
+
+def _read_vertex(file: BinaryIO, path: Path) -> tuple[str | None, list[_Element], _Element, list[str], list[str]]:
+    """Read the header: order of bytes, elements before the vertices, these, comments, and what is left out."""
+    order, elements, comments = _read_header(file, path)
+    names = [element.name for element in elements]
+    if "vertex" not in names:
+        raise InvalidPointsError(
+            f"{path} has no vertices, only {brief(', '.join(names)) or 'nothing'}. It holds no points."
+        )
+    vertex = elements[names.index("vertex")]
+    before = [element for element in elements[: names.index("vertex")] if element.count]
     notices = [
         f"{path.name}: left out {element.count} {brief(element.name)} elements. Only points are read."
         for element in elements
@@ -100,7 +140,7 @@ def read_vertex_columns(path: Path) -> PlyVertices:
     ]
     if vertex.lists:
         notices.append(f"{path.name}: left out {brief(', '.join(vertex.lists))}, lists of numbers at each point.")
-    return PlyVertices(dict(zip(single, columns, strict=True)), order, comments, notices)
+    return order, before, vertex, comments, notices
 
 
 def read_vertex_names(path: Path) -> list[str]:
@@ -177,14 +217,28 @@ def _read_header(file: BinaryIO, path: Path) -> tuple[str | None, list[_Element]
 
 def _read_binary(file: BinaryIO, order: str, before: list[_Element], vertex: _Element, path: Path) -> list[Array]:
     """Read the columns of an element after those before it."""
-    begin = file.tell()
-    for element in before:
-        begin = end_of_records(file, begin, order, element.types, element.count, path)
+    begin = _end(file, order, before, path)
     if vertex.lists:
         return read_fixed(file, begin, order, vertex.types, vertex.count, path)
     codes = [code for code in vertex.codes if code is not None]
-    record = np.dtype([(f"f{index}", order + code) for index, code in enumerate(codes)])
-    rows = read_records(file, begin, record, vertex.count, path)
+    return _columns(read_records(file, begin, _record(order, codes), vertex.count, path), codes)
+
+
+def _end(file: BinaryIO, order: str, elements: list[_Element], path: Path) -> int:
+    """Return where elements end that begin here."""
+    begin = file.tell()
+    for element in elements:
+        begin = end_of_records(file, begin, order, element.types, element.count, path)
+    return begin
+
+
+def _record(order: str, codes: Sequence[str]) -> np.dtype[np.void]:
+    """Return the type of the numbers of one element in the file."""
+    return np.dtype([(f"f{index}", order + code) for index, code in enumerate(codes)])
+
+
+def _columns(rows: Array, codes: Sequence[str]) -> list[Array]:
+    """Return the columns of records in the order of bytes of this machine."""
     return [rows[f"f{index}"].astype(code) for index, code in enumerate(codes)]
 
 

@@ -31,11 +31,19 @@ def read_records(file: BinaryIO, begin: int, record: np.dtype[Any], count: int, 
     path : pathlib.Path
         The file, for the texts of errors.
     """
+    return next(record_blocks(file, begin, record, count, path, max(count, 1)), np.empty(0, record))
+
+
+def record_blocks(
+    file: BinaryIO, begin: int, record: np.dtype[Any], count: int, path: Path, size: int
+) -> Iterator[Array]:
+    """Yield records as of `read_records`, so many at once."""
     found = max(os.fstat(file.fileno()).st_size - begin, 0) // max(record.itemsize, 1)
     if found < count:
         raise too_short(path, found, count)
     file.seek(begin)
-    return np.fromfile(file, record, count)
+    for done in range(0, count, size):
+        yield np.fromfile(file, record, min(size, count - done))
 
 
 def read_rows(file: BinaryIO, types: Sequence[str | None], count: int, path: Path, skipped: int = 0) -> list[Array]:

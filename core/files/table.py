@@ -16,6 +16,7 @@ NORMAL = "normal"  # the attribute that files call nx ny nz
 SCANNER = "scanner"  # the attribute of positions of the scanner that measured a point, which move with the points
 _NORMALS = ("nx", "ny", "nz")
 _COLORS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
+CHANNELS = ("red", "green", "blue", "alpha")
 _ALPHAS = (("alpha",), ("diffuse_alpha",), ("a",))
 _DEPTHS = (8, 10, 12, 16, 32)  # bits of a color
 _AXES = ("x", "y", "z")
@@ -60,6 +61,16 @@ def from_columns(columns: dict[str, Array], path: Path) -> PointTable:
     path : pathlib.Path
         The file, for the texts of errors.
     """
+    table, channels = gather_columns(columns, path)
+    color_by(table, channels, path)
+    return table
+
+
+def gather_columns(columns: dict[str, Array], path: Path) -> tuple[PointTable, dict[str, Array]]:
+    """Make a table without colors of columns as of `from_columns`, and return the columns of the colors, too.
+
+    These are red, green, blue and alpha, in the numbers of the file, or none.
+    """
     named = {name.lower(): name for name in reversed(columns)}  # the first of those that differ in case only
     missing = [axis for axis in _AXES if axis not in named]
     if missing:
@@ -77,12 +88,9 @@ def from_columns(columns: dict[str, Array], path: Path) -> PointTable:
     coordinates = [left.pop(named[axis]) for axis in _AXES]
     table = PointTable(np.stack(coordinates, axis=1, dtype=np.float64))
     table.single = any(values.dtype == np.float32 for values in coordinates)
-    channels = next(filter(None, map(take, _COLORS)), None)
-    if channels is not None:
-        alpha = next(filter(None, map(take, _ALPHAS)), None)
-        colors = np.stack(channels, axis=1)
-        table.colors = unit_colors(colors, alpha[0] if alpha else None)
-        table.notices += depth_notices(colors, path)
+    channels = next(filter(None, map(take, _COLORS)), [])
+    if channels:
+        channels = [*channels, *next(filter(None, map(take, _ALPHAS)), [])]
     normals = take(_NORMALS)
     if normals is not None:
         table.attributes[NORMAL] = np.stack(normals, axis=1)
@@ -93,7 +101,15 @@ def from_columns(columns: dict[str, Array], path: Path) -> PointTable:
             table.attributes[match[1]] = np.stack([left.pop(component) for component in vector], axis=1)
         elif name in left:
             table.attributes[name] = left.pop(name)
-    return table
+    return table, dict(zip(CHANNELS, channels, strict=False))
+
+
+def color_by(table: PointTable, channels: dict[str, Array], path: Path) -> None:
+    """Give a table the colors of columns by the names in `CHANNELS`, if there are any."""
+    if channels:
+        colors = np.stack([channels[name] for name in CHANNELS[:3]], axis=1)
+        table.colors = unit_colors(colors, channels.get(CHANNELS[3]))
+        table.notices += depth_notices(colors, path)
 
 
 def unit_colors(colors: Array, alpha: Floats | None = None) -> Array:
@@ -147,7 +163,7 @@ def to_columns(table: PointTable) -> dict[str, Array]:
         columns.update(zip(_NORMALS, attributes.pop(NORMAL).T, strict=True))
     if table.colors is not None:
         values = np.round(255.0 * table.colors).astype(np.uint8)
-        columns.update(zip(("red", "green", "blue", "alpha"), values.T, strict=True))
+        columns.update(zip(CHANNELS, values.T, strict=True))
     for name, values in attributes.items():
         columns.update((_free_name(new, columns), numbers) for new, numbers in split_columns(name, values).items())
     return columns

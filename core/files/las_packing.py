@@ -1,0 +1,117 @@
+"""What LAS and LAZ files state about themselves, checked before laspy and lazrs act on it."""
+
+import os
+import struct
+from pathlib import Path
+from typing import Any, BinaryIO, NamedTuple
+
+from ..errors import InvalidPointsError
+from .rows import unpacks_too_far
+
+_SHORTEST = 227  # bytes of a header
+_DETAIL = 54  # bytes of a variable length record at least
+_CHUNKED, _LAYERED = 2, 3  # kinds of compression
+# Items of a compressed point by number: bytes, and layers if there are any. Others are extra bytes, a layer for each.
+_ITEMS = {6: (20, 0), 7: (8, 0), 8: (6, 0), 9: (29, 0), 10: (30, 9), 11: (6, 1), 12: (8, 2), 13: (29, 1)}
+_EXTRA = (0, 14)
+
+
+class PackedChunk(NamedTuple):
+    """Compressed points of a file that follow each other: where they begin, their bytes, and how many they are."""
+
+    place: int
+    length: int
+    count: int  # type: ignore[assignment]  # in place of the method of tuples
+
+
+def check_header(file: BinaryIO, path: Path) -> None:
+    """Refuse files that are not LAS, or state more records than fit: laspy would search them all."""
+    size = os.fstat(file.fileno()).st_size
+    data = file.read(_SHORTEST)
+    if len(data) < _SHORTEST or data[:4] != b"LASF":
+        raise InvalidPointsError(f"{path} is no LAS file: it does not begin with the header of one. Export it again.")
+    length, begin, details = struct.unpack_from("<HII", data, 94)
+    if length + details * _DETAIL > begin or begin > size:
+        raise InvalidPointsError(
+            f"{path} is shorter than its header states: {details} records before byte {begin:,} of {size:,}. Copy it"
+            " again."
+        )
+    file.seek(0)
+
+
+def check_size(file: BinaryIO, header: Any, path: Path) -> list[PackedChunk]:
+    """Refuse a file that is too short for its points, before there is memory for them.
+
+    Returns
+    -------
+    list of PackedChunk
+        Of compressed points; none where they are not compressed.
+    """
+    begin, size = header.offset_to_point_data, os.fstat(file.fileno()).st_size
+    needed = header.point_count * header.point_format.size
+    if unpacks_too_far(needed, size) if header.are_points_compressed else needed > size - begin:
+        raise InvalidPointsError(
+            f"{path} is shorter than the {header.point_count:,} points that its header states. Copy it again."
+        )
+    if header.are_points_compressed and header.point_count:
+        chunks = _check_packing(file, begin, size, header, path)
+        file.seek(begin)
+        return chunks
+    return []
+
+
+def _check_packing(file: BinaryIO, begin: int, size: int, header: Any, path: Path) -> list[PackedChunk]:
+    """Return the chunks of compressed points; refuse those that are longer than the file.
+
+    lazrs allocates memory for whatever a file states, and aborts the whole program where there is too little.
+    """
+    import lazrs
+
+    found = [detail.record_data for detail in header.vlrs.get("LasZipVlr")]
+    kind, items = (0, []) if not found else _read_items(found[0])
+    wanted = [size for number, size in items if number in _ITEMS and _ITEMS[number][0] != size]
+    if (
+        kind not in (_CHUNKED, _LAYERED)
+        or wanted
+        or sum(size for _, size in items) != header.point_format.size
+        or any(number not in _ITEMS and number not in _EXTRA for number, _ in items)
+    ):
+        raise InvalidPointsError(f"{path} uses an unknown compression, or is corrupted. Save it again as LAS.")
+    fault = InvalidPointsError(f"{path} is broken: its compressed points do not match its header. Copy it again.")
+
+    def read(code: str, place: int) -> tuple[int, ...]:
+        length = struct.calcsize(code)
+        if not begin <= place <= size - length:
+            raise fault
+        file.seek(place)
+        return struct.unpack(code, file.read(length))
+
+    (end,) = read("<q", begin)
+    if end == -1:  # of programs that write sequentially
+        (end,) = read("<q", size - 8)
+    _, chunks = read("<II", end)
+    if (chunks - 1) * header.point_format.size > end - begin - 8:  # each begins with a whole point, if it has any
+        raise fault
+    file.seek(begin)
+    place, left, result = begin + 8, header.point_count, []
+    layers = sum(_ITEMS[number][1] if number in _ITEMS else length for number, length in items)
+    for count, length in lazrs.read_chunk_table(file, lazrs.LazVlr(found[0])):
+        if left <= 0:
+            break  # writers may begin a chunk at the end that gets no points
+        if not 0 <= length <= end - place:
+            raise fault
+        if kind == _LAYERED:
+            head = header.point_format.size + 4 * (1 + layers)
+            if length < head or sum(read(f"<{layers}I", place + head - 4 * layers)) != length - head:
+                raise fault
+        result.append(PackedChunk(place, length, count))
+        place, left = place + length, left - count
+    if left > 0:
+        raise fault
+    return result
+
+
+def _read_items(data: bytes) -> tuple[int, list[tuple[int, ...]]]:
+    """Return the kind of compression, and number and bytes of each item of a point."""
+    (kind,), (count,) = struct.unpack_from("<H", data), struct.unpack_from("<H", data, 32)
+    return kind, [struct.unpack_from("<HH", data, 34 + 6 * index) for index in range(count)]
