@@ -19,6 +19,7 @@ from .applications.cleaning.smoothing import smoothing_base as smoothing_base
 from .applications.cleaning.strays import Strays as Strays
 from .applications.cleaning.strays import stray_points as stray_points
 from .applications.cleaning.thin_out import thin_out as thin_out
+from .applications.cleaning.thin_pieces import thin_pieces as thin_pieces
 from .applications.deforming.coarse_deformation import CoarseDeformer as CoarseDeformer
 from .applications.deforming.coarse_deformation import coarse_deformer as coarse_deformer
 from .applications.deforming.deformation import Deformation as Deformation

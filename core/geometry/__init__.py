@@ -35,6 +35,6 @@ from .quadrics import CURVED, MANY, check_surface, frames, roundness
 from .rows import look_across_rows
 from .sheets import choose_bridges, join_touching, number_sheets, same_sheet, sheet_neighbors
 from .strays import PARTS, label_parts, stray_scores, without
-from .subset import blue_noise_subset, independent
+from .subset import FINEST, blue_noise_subset, independent, mix_bits
 from .thinning import nearest_in_blocks, thin
 from .winding import orient_patches

@@ -13,7 +13,7 @@ from ..types import Array, Bools, Floats, Ints, Report
 from .points import check_points
 
 _CANDIDATES = 3.0  # voxels for each point wanted: enough to choose from, few enough for their pairs
-_FINEST = 2**21 - 1  # voxels along each axis: three numbers of 21 bits share one of 64
+FINEST = 2**21 - 1  # voxels along each axis: three numbers of 21 bits share one of 64
 _DISCS = 0.7  # points a squared radius that discs in random order leave on an area of one
 _VOXELS = 1.5  # voxels that a surface of area one meets for each squared edge, on average over its directions
 _FEW = 0.9  # of the points wanted, which are enough
@@ -77,7 +77,7 @@ def blue_noise_subset(points: ArrayLike, count: int, *, progress: Report | None 
 
 def _candidates(points: Floats, low: Floats, extent: float, count: int, report: Report) -> tuple[Ints, Ints]:
     """Return a point of each voxel, and the numbers of these voxels, few more than are needed."""
-    finest = extent / _FINEST
+    finest = extent / FINEST
     wanted = _CANDIDATES * count
     edge = finest if len(points) <= wanted else max(extent * np.sqrt(_VOXELS / wanted), finest)
     for _ in range(_TRIALS):
@@ -147,14 +147,18 @@ def _thin(points: Floats, keys: Ints, count: int, report: Report) -> Bools:
 
 
 def _shuffled(keys: Ints) -> Ints:
-    """Return numbers in an order that looks random, for a voxel always the same (the mixing of SplitMix64)."""
-    mixed = keys.astype(np.uint64)
+    """Return numbers in an order that looks random, for a voxel always the same."""
+    rank = np.empty(len(keys), dtype=np.int64)
+    rank[np.argsort(mix_bits(keys.astype(np.uint64)))] = np.arange(len(keys))
+    return rank
+
+
+def mix_bits(numbers: Array) -> Array:
+    """Return numbers of 64 bits that look random, (n,) uint64, for a number always the same (those of SplitMix64)."""
+    mixed = numbers
     for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
         mixed = (mixed ^ (mixed >> np.uint64(shift))) * np.uint64(factor)
-    mixed ^= mixed >> np.uint64(31)
-    rank = np.empty(len(keys), dtype=np.int64)
-    rank[np.argsort(mixed)] = np.arange(len(keys))
-    return rank
+    return mixed ^ (mixed >> np.uint64(31))
 
 
 def _discs(tree: cKDTree, rank: Ints, radius: float) -> Bools:
