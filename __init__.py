@@ -15,7 +15,7 @@ def _modules():
     from .operators import rigging, tools
     from .operators.deform import bake, handle_kind, live
     from .operators.deform import tools as deform
-    from .operators.files import command, exporting, importing
+    from .operators.files import command, exporting, importing, tiles
     from .operators.objects import counting, motion, motion_files, notices, settings
     from .operators.running import cache, job
     from .ui import (
@@ -53,6 +53,7 @@ def _modules():
         live,
         *_within(rigging),
         importing,
+        tiles,
         exporting,
         command,
         show,

@@ -6,6 +6,7 @@ from ..operators.deform.bake import MESHFREE_OT_deform_bake
 from ..operators.deform.tools import MESHFREE_OT_deform_apply, keyed_empties
 from ..operators.files.exporting import MESHFREE_OT_export_points, MESHFREE_OT_export_splats
 from ..operators.files.importing import MESHFREE_OT_import_points
+from ..operators.files.tiles import MESHFREE_OT_import_tiles
 from ..operators.objects.groups import FIXED, HIGH, LOW, ROLES, SOURCE, VALUE, has_group
 from ..operators.running.application import ApplicationOperator
 from ..operators.tools.profile import MESHFREE_OT_profile
@@ -20,7 +21,7 @@ def draw_setting(layout, settings, name: str, obj):
     """Draw a setting; that of a group or an attribute with a list of those of an object."""
     if name.endswith("group"):
         search_group(layout, settings, name, obj)
-    elif name in {"viewpoint", "curve", "plane", "toucher"}:
+    elif name in {"viewpoint", "curve", "plane", "toucher", "box"}:
         layout.prop_search(settings, name, bpy.data, "objects")
     elif name == "source":
         layout.prop_search(settings, name, obj.data, "attributes")
@@ -84,6 +85,7 @@ _ASKING = (
     MESHFREE_OT_export_points,
     MESHFREE_OT_export_splats,
     MESHFREE_OT_import_points,
+    MESHFREE_OT_import_tiles,
     MESHFREE_OT_deform_bake,
     MESHFREE_OT_analyze_sequence,
     MESHFREE_OT_select_grow,

@@ -82,6 +82,7 @@ def _draw_import(self, _context):
     self.layout.operator(
         "meshfree.import_points", text="Points (.las/.laz/.e57/.ply/.pcd/.obj/.xyz/.pts/.ptx/.csv/.npy/.splat/.spz)"
     )
+    self.layout.operator("meshfree.import_tiles", text="Point Tiles (.las/.laz/.copc.laz/.ply)")
 
 
 def _draw_export(self, _context):

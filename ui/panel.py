@@ -100,6 +100,7 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
                 layout.operator("meshfree.analyze_sequence", text="Analyze Sequence...", icon="SEQUENCE")
             elif context.mode == "OBJECT":
                 layout.operator("meshfree.import_points", text="Import Points...", icon="IMPORT")
+                layout.operator("meshfree.import_tiles", text="Import Tiles...")
             return
         _draw_summary(layout, context, obj)
         _draw_notices(layout, context, obj)

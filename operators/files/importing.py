@@ -2,12 +2,10 @@
 
 import os
 from dataclasses import replace
-from pathlib import Path
 
 import bpy
 import numpy as np
-from bpy.props import BoolProperty, CollectionProperty, EnumProperty, StringProperty
-from bpy_extras.io_utils import ImportHelper
+from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ... import core
 from ...command.clouds import read_file
@@ -17,13 +15,10 @@ from ...core.files import (
     SCANS,
     SPLATS,
     TEXTS,
-    LasChoices,
     frame_number,
     numbered_files,
     order_frames,
-    parse_classes,
 )
-from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import DISC, check_size, deselect, point_count, tag_changed, write_attribute
 from ..objects.colors import own_colors
 from ..objects.handlers import notify
@@ -32,9 +27,8 @@ from ..objects.place import OFFSET, known_offset, offset_of
 from ..objects.reading import discs
 from ..registration import Registration
 from ..running import cache
-from ..running.job import JobOperator
 from ..running.ready import reporting
-from .columns import column_notices
+from .importer import ImportOperator, convert
 from .objects import add_object, file_filter
 from .sequence import add_sequence
 from .splats import add_splats, is_drawn, mark
@@ -44,43 +38,15 @@ OWN = tuple(
 )  # which Blender reads itself, too
 
 _QUICK = 80_000  # points whose discs take less than two seconds
-_DEPTH = 10.0  # clipping distance of views relative to that of their center
 _DRAWN = 200_000  # splats whose ellipsoids are drawn at once
-_KINDS = [("MESH", "Mesh", "A mesh of loose vertices, which Edit Mode can select and vertex groups can hold")]
-if bpy.app.version >= (4, 5, 0):
-    _KINDS.append(("POINTCLOUD", "Point Cloud", "A point cloud object, which shows its points by itself"))
 
 
-# Blender 5.2 crashes when it is given a path relative to the file for a property that does not say so.
-_RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set()
-
-
-class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
+class MESHFREE_OT_import_points(ImportOperator, bpy.types.Operator):
     """Import the points of LAS, LAZ, E57, PLY, PCD, OBJ, XYZ, PTS, PTX, CSV, text and numpy files, or splats"""
 
     bl_idname = "meshfree.import_points"
     bl_label = "Import Points"
-    bl_options = {"REGISTER", "UNDO", "PRESET"}
-    filepath: StringProperty(
-        name="File Path",
-        description="File to import",
-        maxlen=1024,
-        subtype="FILE_PATH",
-        options={"HIDDEN", "SKIP_PRESET", *_RELATIVE},
-    )
     filter_glob: file_filter(*READABLE, *SPLATS)
-    files: CollectionProperty(
-        type=bpy.types.OperatorFileListElement,
-        name="Files",
-        description="Names of the files in the folder, if there are several",
-        options={"HIDDEN", "SKIP_SAVE"},
-    )
-    directory: StringProperty(
-        name="Folder",
-        description="Folder of several files",
-        subtype="DIR_PATH",
-        options={"HIDDEN", "SKIP_SAVE", *_RELATIVE},
-    )
     up: EnumProperty(
         name="Up",
         description="Axis of the file that points upwards",
@@ -90,12 +56,6 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
             ("-Y", "-Y", "Rotate points stored with Y downwards, as many Gaussian splats are"),
         ],
         default="Z",
-    )
-    kind: EnumProperty(name="Object", description="What the points become", items=_KINDS, default="MESH")
-    attributes: BoolProperty(
-        name="Attributes",
-        description="Import the other columns too: colors, normals, intensity and so on",
-        default=True,
     )
     columns: StringProperty(
         name="Columns",
@@ -121,71 +81,27 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         " before stays",
         default=False,
     )
-    classes: StringProperty(
-        name="Classes",
-        description="Import only points of these classes of LAS files, such as 2 5 or 3-5 (2 is the ground); empty for"
-        " all",
-    )
-    withheld: BoolProperty(
-        name="Withheld Points",
-        description="Import points of LAS files, too, that are flagged as withheld, which means deleted",
-        default=False,
-    )
-    frame: BoolProperty(
-        name="Frame in View",
-        description="Let the 3D views look at the imported points, unless a script imports them",
-        default=True,
-    )
 
     @property
     def asks(self):
         """Names of the settings; some only for sequences or for a kind of file; those of text until one is chosen."""
         sequence = ("sequence", "numbers") if self.sequence else ("sequence",)
-        suffixes = {path.suffix.lower() for path in self._chosen()}
+        suffixes = {path.suffix.lower() for path in self.chosen()}
         scans = ("classes", "withheld") if suffixes & {*SCANS} else ()
         text = ("columns",) if suffixes & {"", *TEXTS} else ()
         return "up", "kind", "attributes", *text, *scans, "surface", *sequence, "frame"
 
-    @classmethod
-    def obstacle(cls, context):
-        if context.mode == "OBJECT":
-            return ""
-        return "Points are imported in Object Mode. Switch to Object Mode first"
-
-    def invoke(self, context, event):
-        self._attended = True
-        return self.invoke_popup(context)
-
     @reporting
     def execute(self, context):
-        self._framed = self._attended and self.frame
-        paths, choices = self._chosen(), LasChoices(parse_classes(self.classes), self.withheld)
+        paths, choices = self.chosen(), self.las_choices()
         if self.sequence:
             paths = order_frames(paths) if len(paths) > 1 else numbered_files(paths[0].parent)
         self._paths = paths
         surface, columns = self.surface and not self.sequence, self.columns
-        return self.work(context, [], lambda progress: _read_all(paths, columns, choices, surface, progress))
+        return self.begin(context, lambda progress: _read_all(paths, columns, choices, surface, progress))
 
-    def _chosen(self):
-        """Return the chosen files."""
-        names = [item.name for item in self.files if item.name]
-        folder = Path(bpy.path.abspath(self.directory))
-        return [folder / name for name in names] or [Path(bpy.path.abspath(self.filepath))]
-
-    def finish(self, context, objects, results):
+    def add(self, context, read):
         """Add an object for each table."""
-        reason = self.obstacle(context)
-        if reason:  # while the files were read
-            raise PointCloudError(reason)
-        with all_or_nothing([]):
-            self._add(context, results)
-        if self._framed:
-            _frame_selected(context)
-        return {"FINISHED"}
-
-    def _add(self, context, read):
-        for other in context.selected_objects:
-            other.select_set(False)
         shared = known_offset(context.scene)
         surfaces, clouds = [], []
         for path, (table, found) in zip(self._paths, read, strict=True):
@@ -198,7 +114,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
             obj = add_object(path.stem, upright, context.collection, shared, self.attributes)
             obj.select_set(True)
             context.view_layer.objects.active = obj
-            self._report(obj, table, shared, f"{len(table.points):,} points")
+            self.tell(obj, table, shared, f"{len(table.points):,} points")
             if isinstance(found, str):
                 self.note(f"{obj.name} is shown as dots. {found}", obj)
             elif found is not None:
@@ -209,7 +125,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
             if shared is None and OFFSET in obj:
                 shared = offset_of(obj)
         every = context.selected_objects
-        _convert(context, every if self.kind == "POINTCLOUD" else clouds)
+        convert(context, every if self.kind == "POINTCLOUD" else clouds)
         for obj in every:
             obj.select_set(True)
             deselect(obj.data)  # else the first assignment to a group would include all points
@@ -231,7 +147,7 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         obj.select_set(True)
         context.view_layer.objects.active = obj
         degree = round(np.sqrt(splats.harmonics.shape[1] + 1)) - 1
-        self._report(obj, splats, shared, f"{len(splats):,} Gaussian splats with harmonics of degree {degree}")
+        self.tell(obj, splats, shared, f"{len(splats):,} Gaussian splats with harmonics of degree {degree}")
         return obj
 
     def _join(self, context):
@@ -249,43 +165,6 @@ class MESHFREE_OT_import_points(JobOperator, ImportHelper, bpy.types.Operator):
         missing = numbers[-1] - numbers[0] + 1 - len(numbers)
         rest = f"; {missing} of them have no file and show the one before" if missing else ""
         self.report({"INFO"}, f"{sequence.name}: frames {numbers[0]} to {numbers[-1]}{rest}")
-
-    def _report(self, obj, table, shared, what):
-        """Report what was imported, and how its coordinates were shifted."""
-        for notice in (*table.notices, *column_notices(obj, getattr(table, "attributes", {}))):
-            self.warn(notice, obj)
-        offset = offset_of(obj)
-        self.report({"INFO"}, f"{obj.name}: {what}")
-        if offset.any():
-            self.note(f"{obj.name} is shifted by ({', '.join(f'{0.0 - value:.10g}' for value in offset)})", obj)
-        if shared is not None and (offset != shared).any():
-            self.warn(f"{obj.name} is too far from the points imported before to share their shift", obj)
-
-
-def _convert(context, objects):
-    """Convert new meshes to point clouds, where Blender can."""
-    if bpy.app.version < (4, 5) or not objects:
-        return
-    context.view_layer.update()
-    for other in context.view_layer.objects:
-        other.select_set(other in objects)
-    active = context.view_layer.objects.active
-    context.view_layer.objects.active = objects[0]
-    meshes = [obj.data for obj in objects]
-    bpy.ops.object.convert(target="POINTCLOUD")
-    bpy.data.batch_remove(meshes)
-    context.view_layer.objects.active = active
-
-
-def _frame_selected(context):
-    """Frame the selected objects in all 3D views of the window."""
-    for area in context.window.screen.areas:
-        if area.type == "VIEW_3D":
-            region = next(region for region in area.regions if region.type == "WINDOW")
-            with context.temp_override(area=area, region=region):
-                bpy.ops.view3d.view_selected()
-                space, view = area.spaces.active, area.spaces.active.region_3d
-                space.clip_end = max(space.clip_end, _DEPTH * view.view_distance)  # else large scans are clipped
 
 
 def _read_all(paths, columns, choices, surface, progress):

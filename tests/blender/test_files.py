@@ -298,7 +298,7 @@ class TestColumns:
             (["a.ply"], 0),
             (["a.ptx"], 0),
         ):
-            chosen._chosen = lambda names=names: [Path(name) for name in names]
+            chosen.chosen = lambda names=names: [Path(name) for name in names]
             assert ("columns" in asks(chosen)) == text
 
     def test_results_come_back_as_results(self, tmp_path):
@@ -530,7 +530,7 @@ class TestMenus:
 
     def test_entries(self, extension):
         for name, idnames in (
-            ("import", ["import_points"]),
+            ("import", ["import_points", "import_tiles"]),
             (
                 "export",
                 [

@@ -373,7 +373,7 @@ def check_dialog(name):
     properties = [item for item in getattr(bpy.ops.meshfree, name).get_rna_type().properties if not item.is_hidden]
     properties = [item for item in properties if item.type != "POINTER" and item.identifier != "filepath"]
     values = {item.identifier: item.default for item in properties}
-    hidden = {"_chosen": lambda: [Path("a.las"), Path("b.txt")]} if name == "import_points" else {}
+    hidden = {"chosen": lambda: [Path("a.las"), Path("b.txt")]} if name == "import_points" else {}
     choices = [item for item in properties if item.type == "ENUM"]
     variants = [{item.identifier: choice} for item in choices for choice in item.enum_items.keys()]
     texts = []

@@ -2,8 +2,6 @@
 
 import struct
 
-import laspy
-import lazrs
 import numpy as np
 
 ENTRY = "<iiiiQii"
@@ -37,6 +35,9 @@ def write_copc(path, points, capacity=20, pages=False, change=lambda entries: en
     change : callable
         Changes the entries of nodes before they are written: tuples of level, x, y, z, place, bytes, and points.
     """
+    import laspy  # which in Blender comes with the extension
+    import lazrs
+
     las = laspy.LasData(laspy.LasHeader(point_format=6, version="1.4"))
     las.header.offsets, las.header.scales = points.min(axis=0), np.full(3, 0.001)
     las.x, las.y, las.z = points.T
