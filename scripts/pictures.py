@@ -23,7 +23,7 @@ import scan_pictures
 import studio
 import transfer_pictures
 from coral import spread_directions
-from studio import part, row, single
+from studio import grid, part, row, single
 
 OUTPUT = package.ROOT / "docs" / "pictures"
 CUT = 0.45  # height at which the shape is cut open for the picture of a boundary
@@ -210,6 +210,32 @@ def thin_out(path):
     for obj in (before, after):
         studio.show_shape(obj, like=before)
     row((before, after), path, legend=None)
+
+
+def import_tiles(path):
+    """Four tiles of a terrain: an overview of 8,000 points, and a place of it with all points, enlarged four times."""
+    random, write = np.random.default_rng(5), part("core.files").write_points
+    with TemporaryDirectory() as folder:
+        names = [f"tile_{x}_{y}.ply" for x in (0, 1) for y in (0, 1)]
+        for name in names:
+            places = random.uniform(0.0, 50.0, (60_000, 2)) + 50.0 * np.array([int(word) for word in name[5:8:2]])
+            x, y = 0.1 * places.T
+            height = (
+                3.0 * np.sin(x) * np.cos(0.7 * y) + np.sin(2.3 * x + 1.0) * np.sin(1.9 * y) + 0.3 * np.sin(7.0 * x + y)
+            )
+            table = part("core.files").PointTable(np.column_stack([places, height]), {"height": height})
+            write(Path(folder) / name, table)
+        tiles = {"directory": folder, "files": [{"name": name} for name in names], "color": "height"}
+        bpy.ops.meshfree.import_tiles(count=8000, **tiles)
+        overview = bpy.context.object
+        bpy.ops.object.empty_add(type="CUBE", radius=10.0, location=(50.0, 50.0, 0.0))
+        bpy.ops.meshfree.import_tiles(density="ALL", box=bpy.context.object.name, **tiles)
+    detail = bpy.context.object
+    detail.scale = 3 * (4.0,)
+    for obj in (overview, detail):
+        studio.show(obj, "height", radius=0.9)
+        studio.set_range(obj, -4.0, 4.0)
+    grid([[overview, detail]], path)
 
 
 def sequence(path):
@@ -438,6 +464,7 @@ PICTURES = {
     "smooth": smooth,
     "stray_points": stray_points,
     "thin_out": thin_out,
+    "import_tiles": import_tiles,
     "sequence": sequence,
     "mode_shape": mode_shape,
     "segment": segment,

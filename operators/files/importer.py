@@ -24,7 +24,7 @@ _RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) els
 
 
 class ImportOperator(JobOperator, ImportHelper):
-    """An operator that imports points of the chosen files; `add` puts into the scene what was read."""
+    """An operator that imports points of the chosen files; `_add` puts into the scene what was read."""
 
     bl_options = {"REGISTER", "UNDO", "PRESET"}
     filepath: StringProperty(
@@ -101,7 +101,7 @@ class ImportOperator(JobOperator, ImportHelper):
         with all_or_nothing([]):
             for other in context.selected_objects:
                 other.select_set(False)
-            self.add(context, results)
+            self._add(context, results)
         if self._framed:
             _frame_selected(context)
         return {"FINISHED"}

@@ -100,7 +100,7 @@ class MESHFREE_OT_import_points(ImportOperator, bpy.types.Operator):
         surface, columns = self.surface and not self.sequence, self.columns
         return self.begin(context, lambda progress: _read_all(paths, columns, choices, surface, progress))
 
-    def add(self, context, read):
+    def _add(self, context, read):
         """Add an object for each table."""
         shared = known_offset(context.scene)
         surfaces, clouds = [], []

@@ -123,7 +123,7 @@ class MESHFREE_OT_import_tiles(ImportOperator, bpy.types.Operator):
         )
         return self.begin(context, lambda progress: _read(paths, wanted, self._name, progress))
 
-    def add(self, context, read):
+    def _add(self, context, read):
         """Add the object."""
         table, total = read
         shared = known_offset(context.scene)

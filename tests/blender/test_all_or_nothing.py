@@ -365,6 +365,16 @@ def test_nothing_is_left_of_an_import_that_fails(extension, tmp_path, kind):
     assert fail_everywhere(extension, handled, "import_points", filepath=str(path), kind=kind) > 2
 
 
+@pytest.mark.parametrize("kind", ["MESH", "POINTCLOUD"][: 1 + (bpy.app.version >= (4, 5))])
+def test_nothing_is_left_of_tiles_whose_import_fails(extension, tmp_path, kind):
+    for number in (1, 2):
+        files = part("core.files")
+        table = files.PointTable(sphere_points(50) + number, {"classification": np.arange(50)})
+        files.write_points(tmp_path / f"tile_{number}.ply", table)
+    tiles = {"directory": str(tmp_path), "files": [{"name": path.name} for path in tmp_path.iterdir()]}
+    assert fail_everywhere(extension, handled, "import_tiles", kind=kind, **tiles) > 2
+
+
 def test_nothing_is_left_of_a_sequence_whose_import_fails(extension, tmp_path):
     for number in (1, 2):
         np.save(tmp_path / f"points_{number}.npy", sphere_points(50))
