@@ -156,9 +156,10 @@ class MESHFREE_OT_import_tiles(ImportOperator, bpy.types.Operator):
 
 def _name_of(paths):
     """Return what the names of files have in common, without numbers at the end, or that of the only file."""
-    if len(paths) == 1:
-        return paths[0].stem
-    first, last = min(path.stem for path in paths), max(path.stem for path in paths)
+    names = [path.stem.removesuffix(".copc") for path in paths]
+    if len(names) == 1:
+        return names[0]
+    first, last = min(names), max(names)
     common = next((index for index, (a, b) in enumerate(zip(first, last, strict=False)) if a != b), len(first))
     return first[:common].rstrip("0123456789_-. ") or "Tiles"
 

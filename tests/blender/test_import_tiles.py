@@ -128,6 +128,7 @@ def test_levels_of_detail(tmp_path):
     points = ground()
     levels = write_copc(tmp_path / "a.copc.laz", points)
     obj = run_import([tmp_path / "a.copc.laz"], density="LEVEL", level=1)
+    assert obj.name == "a"
     assert_array_equal(np.sort(attribute(obj, "intensity")), np.flatnonzero(levels <= 1))
     write_las(tmp_path / "b.laz", points)
     with pytest.raises(RuntimeError, match="has no levels of detail, which only COPC files have"):
