@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.gui.test_play import UNCHANGED, add_sphere, colored, finish, shading
+from tests.gui.test_play import UNCHANGED, WORKING, add_sphere, colored, finish, shading
 
 EGG = """
 import os
@@ -64,6 +64,48 @@ class TestDrop:
         gui.press("meshfree.analyze")  # 4
         gui.wait_until("'lb_area' in bpy.context.object.data.attributes", 90)
         gui.wait_for(lambda: colored(gui.pixels(middle)) > gray + 20000, "the points are colored", 240)
+
+
+class TestTiles:
+    """Several files as one object: the dialog, its end, and Esc while they are read."""
+
+    @pytest.fixture
+    def asked(self, gui, request):
+        """Write two tiles of so many points, and open the dialog."""
+        gui.python(
+            f"""
+import os
+names = ["tile_1.npy", "tile_2.npy"]
+for index, name in enumerate(names):
+    np.save(os.path.join(bpy.app.tempdir, name), np.random.default_rng(index).uniform(size=({request.param}, 3)))
+area, region, _ = view3d()
+with bpy.context.temp_override(window=main_window(), area=area, region=region):
+    files = {{"filepath": os.path.join(bpy.app.tempdir, names[0]), "directory": bpy.app.tempdir}}
+    bpy.ops.meshfree.import_tiles("INVOKE_DEFAULT", files=[{{"name": name}} for name in names], count=1000, **files)
+"""
+        )
+        gui.settle()
+        gui.shot("tiles")
+        return gui
+
+    @pytest.mark.parametrize("asked", [20_000], indirect=True)
+    def test_confirmed(self, asked):
+        asked.key("Return")
+        asked.wait_until("'tile' in bpy.data.objects", 60)
+        finish(asked)
+        assert 900 <= asked.python("len(bpy.data.objects['tile'].data.vertices)") <= 1000
+        asked.point_at_view()
+        asked.key("ctrl+z")
+        asked.wait_until("'tile' not in bpy.data.objects")
+
+    @pytest.mark.parametrize("asked", [3_000_000], indirect=True)
+    def test_escape(self, asked):
+        asked.key("Return")
+        asked.wait_until(WORKING)
+        asked.point_at_view()
+        asked.key("Escape")
+        finish(asked, 10)
+        assert asked.python("bpy.data.objects.keys()") == []
 
 
 class TestTasks:
