@@ -104,11 +104,14 @@ class MESHFREE_OT_import_tiles(ImportOperator, bpy.types.Operator):
         return *density, "box", "kind", "attributes", *color, "classes", "withheld", "frame"
 
     def column_names(self):
-        """Return the names of the columns of the first chosen file."""
-        path = self.chosen()[0]
-        if not os.path.isfile(path):
+        """Return the names of the columns of the first chosen file; none of one that cannot be read.
+
+        That is told when it is imported; here Blender asks at each letter that is typed.
+        """
+        try:
+            return [*next(iter(chunks(self.chosen()[0], 1)), (None, {}))[1]]
+        except PointCloudError:
             return []
-        return [*next(iter(chunks(path, 1)), (None, {}))[1]]
 
     @reporting
     def execute(self, context):

@@ -58,6 +58,9 @@ def folder(core, run, tmp_path, monkeypatch):  # noqa: F811
         for number in (1, 2):
             write_ply(tmp_path / name / f"{name}_{number}.ply", columns(scan * [1.0, 1.0, 1.0 + 0.02 * number]))
     write_las(tmp_path / "first.las", scan)
+    (tmp_path / "survey").mkdir()
+    for number, tile in enumerate(np.split(scan[np.argsort(scan[:, 0])][: len(scan) // 2 * 2], 2)):
+        write_las(tmp_path / "survey" / f"tile_{number}.laz", tile)
     rigged = add_object(scan)
     for name, members in (("Arm", scan[:, 0] > 0.0), ("Leg", scan[:, 0] <= 0.0)):
         add_group(rigged, name, members)

@@ -14,6 +14,7 @@ from benchmarks.samplings import fibonacci_sphere
 from command import verbs
 from command.main import run
 from core.files import PointTable, write_points
+from tests.core.copc_files import write_copc
 from tests.pages import NOT_RUN, ROOT, snippets, typed
 
 MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
@@ -30,8 +31,11 @@ def test_every_snippet_is_run_or_listed_and_every_listed_one_is_on_a_page():
 
 
 @by_name("core")
-def test_code(snippet):
+def test_code(snippet, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     points = fibonacci_sphere(800)
+    if "survey.copc.laz" in snippet.text:
+        write_copc(Path("survey.copc.laz"), points)
     exec(compile(snippet.text, snippet.id, "exec"), {"points": points, "values": points[:, 2], "np": np})
 
 
