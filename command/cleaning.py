@@ -28,6 +28,7 @@ STRAYS = {
             "Points of parts with less area than this are stray, too; the largest part never is",
             0.0,
             0.0,
+            form="AREA",
         ),
     )
 }
@@ -36,7 +37,13 @@ THIN_OUT = {
     setting.name: setting
     for setting in (
         Setting("by", "What says how many points stay", "SPACING", choices=("SPACING", "NUMBER")),
-        Setting("spacing", "Least distance between points, for Spacing; 0 for twice the present one", 0.0, 0.0),
+        Setting(
+            "spacing",
+            "Least distance between points, for Spacing; 0 for twice the present one",
+            0.0,
+            0.0,
+            form="LENGTH",
+        ),
         Setting("count", "How many points stay at most, for Number", 10_000, 1),
         Setting("keep_edges", "Keep points at edges before others, the sharpest first", True),
     )

@@ -26,7 +26,7 @@ class CloudVerb(Verb):
     @property
     def description(self):
         """What it does, in full."""
-        return f"{self.help[0].upper()}{self.help[1:]}. {ONE_LINE}"
+        return f"{self.help[0].upper()}{self.help[1:]}. Lengths are in the unit of the coordinates. {ONE_LINE}"
 
     def add_options(self, parser):
         for setting in self.settings:
@@ -56,11 +56,14 @@ class SurfaceVerb(CloudVerb):
         for setting in LAPLACIAN.values():
             add_setting(parser, setting)
 
+    def boundary(self, cloud, values):
+        """Return the boundary points that a column names, (n,) bool; None if none does."""
+        name = values["boundary_group"]
+        return cloud.numbers(name, "--boundary-group") > 0 if name else None
+
     def build(self, cloud, values, progress):
         """Return the operator of a cloud, by the values of the settings in `LAPLACIAN`."""
-        boundary, name = None, values["boundary_group"]
-        if name:
-            boundary = cloud.numbers(name, "--boundary-group") > 0
+        boundary = self.boundary(cloud, values)
         built = analysis.build(cloud.points, laplacian_options(values), boundary, cloud.out, progress)
         sides = cloud.columns.get(ORIENTATION)
         return built if sides is None else analysis.oriented(built, sides)

@@ -13,7 +13,13 @@ COMPARE = {
         Setting(
             "align_first", "Move the object onto the other cloud before it is compared, as Align Points does", False
         ),
-        Setting("greatest", "Points farther from the other surface are not compared; 0 for any distance", 0.0, 0.0),
+        Setting(
+            "greatest",
+            "Points farther from the other surface are not compared; 0 for any distance",
+            0.0,
+            0.0,
+            form="LENGTH",
+        ),
     )
 }
 

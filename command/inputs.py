@@ -80,6 +80,12 @@ def find_inputs(parser, verb, arguments):
     arguments.inputs = files[number - 1 :: count]
 
 
+def check_beside(parser, arguments, option):
+    """Refuse an option for a further file beside the output, if there is none, by `parser.error`."""
+    if getattr(arguments, option) and arguments.out is None and arguments.out_dir is None:
+        parser.error(f"--{option} writes a file beside the output: give --out or --out-dir, too")
+
+
 def _listed(source):
     """Return the paths in a list; none without one."""
     if source is None:

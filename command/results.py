@@ -1,5 +1,7 @@
 """Results at the points other than those of an analysis, for the command line and for Blender's tools."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from . import core
@@ -13,9 +15,23 @@ ROUGHNESS = {
             "Wavelength of which half counts as roughness; 0 for a default suited to the points",
             0.0,
             0.0,
+            form="LENGTH",
         ),
     )
 }
+
+
+class Told(NamedTuple):
+    """A result at the points as it is written, with notices, and a line on it."""
+
+    values: object
+    notices: list
+    line: str
+
+
+def number_text(value) -> str:
+    """Write a length or an area of a file, whose unit is not known."""
+    return f"{value:.4g}"
 
 
 def check_wavelength(wavelength, points, name):

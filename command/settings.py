@@ -1,6 +1,7 @@
 """Settings of the Laplacian and of tools, for properties of Blender and for options of the command line."""
 
 import argparse
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ class Setting(NamedTuple):
     ----------
     name, description : str
         Its name in Python, and what it is in the words of the manual.
-    default : bool, int, float or str
+    default : bool, int, float, str or sequence of float
         Its type is that of the values. For one of several choices in upper case.
     least, most : float or None
         Bounds of a number.
@@ -26,7 +27,7 @@ class Setting(NamedTuple):
     convert : callable or None
         Function from the text of an option to the value, if not the type of the default.
     form : str
-        Of the option's text, in the help.
+        Of the option's text, in the help: "LENGTH" and "AREA" are in the units of the file.
     """
 
     name: str
@@ -47,7 +48,9 @@ class Setting(NamedTuple):
 
 def add_setting(parser, setting):
     """Add an option for a setting; without it the value is None."""
-    kind = {"help": setting.description.replace("%", "%%"), "default": None}
+    shown = _shown(setting)
+    text = f"{setting.description} (default {shown})" if shown else setting.description
+    kind = {"help": text.replace("%", "%%"), "default": None}
     if setting.choices:
         kind.update(type=str.upper, choices=setting.choices)
     elif isinstance(setting.default, bool):
@@ -57,6 +60,16 @@ def add_setting(parser, setting):
     else:
         kind.update(type=_number(setting), metavar=setting.form or type(setting.default).__name__.upper())
     parser.add_argument(f"--{setting.name.replace('_', '-')}", **kind)
+
+
+def _shown(setting) -> str:
+    """Return the default of a setting as its option takes it."""
+    if isinstance(setting.default, bool):
+        return "on" if setting.default else "off"
+    if isinstance(setting.default, str):
+        return setting.default
+    values = math.degrees(setting.default) if setting.form == "DEGREES" else setting.default
+    return ",".join(f"{value:.6g}" for value in np.atleast_1d(values).tolist())
 
 
 def _number(setting):
@@ -81,6 +94,11 @@ def chosen(settings, arguments) -> dict:
     return {
         setting.name: setting.default if given[setting.name] is None else given[setting.name] for setting in settings
     }
+
+
+def radians(text):
+    """Parse an angle in degrees."""
+    return math.radians(float(text))
 
 
 def place(text):
@@ -184,8 +202,16 @@ LAPLACIAN = {  # in the order of the panel
 def laplacian_options(values):
     """Return the options of the operator by the values of settings, choices in upper or lower case."""
     kind = core.PaperOptions if values["laplacian"].lower() == "paper" else core.LaplacianOptions
-    names = kind.__dataclass_fields__
-    return kind(**{name: _lower(values[name]) for name in names})
+    return _options(kind, values)
+
+
+def default_options(values):
+    """Return the options of the default method, where the paper's operator is not usable."""
+    return _options(core.LaplacianOptions, values)
+
+
+def _options(kind, values):
+    return kind(**{name: _lower(values[name]) for name in kind.__dataclass_fields__})
 
 
 def _lower(value):

@@ -11,18 +11,29 @@ from .cleaning import STRAYS, THIN_OUT, check_some_stay, stray_line, thin_line, 
 from .cloud_verb import CloudVerb, SurfaceVerb, floaters
 from .measures import check_labels, check_numbers, part_table
 from .mesh_verb import Mesh
+from .moving_verbs import MinimalSurface, ModeShape, Smooth
 from .quantities import SEGMENT, STRAY, eigenvector_name, written_by
 from .reference_verbs import Align, Compare
-from .result_verbs import PrincipalCurvatures, Roughness, SurfaceVariation
+from .result_verbs import (
+    HarmonicField,
+    Orient,
+    PrincipalCurvatures,
+    Roughness,
+    Segment,
+    Signature,
+    SurfaceVariation,
+)
 from .rows import TABLES, write_rows
 from .settings import LAPLACIAN, Setting, chosen
+from .source_verbs import ExtendDirection, GeodesicDistance, NearestSource, SignedDistance, Simulate, Unwrap
 from .summary import Report
+from .table_verbs import Profile, Section
 
 
 def make_verbs() -> list:
-    """Return new verbs of all kinds."""
-    on_surfaces = Analyze(), PrincipalCurvatures(), Roughness(), SurfaceVariation(), Measure(), Mesh()
-    return [*on_surfaces, StrayPoints(), ThinOut(), Align(), Compare(), *without_object()]
+    """Return new verbs of all kinds: those on surfaces, those on points, and those that need no object."""
+    on_surfaces = (Analyze, *_MEASURING, *_MOVING, Mesh, Segment, Signature, *_ALONG, HarmonicField)
+    return [verb() for verb in (*on_surfaces, StrayPoints, ThinOut, Align, Compare)] + without_object()
 
 
 def without_object() -> list:
@@ -199,3 +210,8 @@ class ThinOut(CloudVerb):
         written = [] if output is None else clouds.write(output, cloud.taken(kept), {})
         apart = "" if spacing is None else f", at least {spacing:.4g} from each other"
         return {"points": int(np.count_nonzero(kept)), "done": f"{path.stem}: {thin_line(kept)}{apart}"}, written
+
+
+_MEASURING = PrincipalCurvatures, Roughness, SurfaceVariation, Orient, Measure, Section, Profile
+_MOVING = Smooth, ModeShape, MinimalSurface
+_ALONG = GeodesicDistance, NearestSource, SignedDistance, Unwrap, ExtendDirection, Simulate

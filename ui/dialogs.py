@@ -2,12 +2,13 @@
 
 import bpy
 
+from ..command.groups import FIXED, HIGH, LOW, ROLES, SOURCE, VALUE
 from ..operators.deform.bake import MESHFREE_OT_deform_bake
 from ..operators.deform.tools import MESHFREE_OT_deform_apply, keyed_empties
 from ..operators.files.exporting import MESHFREE_OT_export_points, MESHFREE_OT_export_splats
 from ..operators.files.importing import MESHFREE_OT_import_points
 from ..operators.files.tiles import MESHFREE_OT_import_tiles
-from ..operators.objects.groups import FIXED, HIGH, LOW, ROLES, SOURCE, VALUE, has_group
+from ..operators.objects.groups import has_group
 from ..operators.running.application import ApplicationOperator
 from ..operators.tools.profile import MESHFREE_OT_profile
 from ..operators.tools.select import MESHFREE_OT_select_grow, selection

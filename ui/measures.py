@@ -5,8 +5,8 @@ from math import ceil, floor, isfinite, log10
 import bpy
 
 from ..command.quantities import quantity
+from ..command.units import attribute_power, unit
 from ..operators.objects.parts import are_outdated, kept_rows
-from ..operators.objects.units import attribute_power, unit
 from ..operators.registration import Registration, Row
 from ..operators.running.ready import ReadyOperator
 from ..operators.tools.measure_live import followed

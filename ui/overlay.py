@@ -6,11 +6,11 @@ from typing import NamedTuple
 import bpy
 import numpy as np
 
+from ..command.units import EIGENVALUE_POWER, unit
 from ..core import PointCloudError
 from ..operators.deform.handles import handled_object
 from ..operators.objects.attributes import mode_number
 from ..operators.objects.result import read_eigenvalues
-from ..operators.objects.units import EIGENVALUE_POWER, unit
 from . import canvas, plots
 from .display import find_display, is_in_solid, range_node, shown_attribute, shown_values, without_unreached
 from .scale import shown_scale

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..operators.objects.ticks import round_ticks, tick_texts
+from ..command.ticks import round_ticks, tick_texts
 from .canvas import DIM, WHITE, Picture
 from .colormaps import to_display
 

@@ -2,19 +2,9 @@
 
 import bpy.utils.previews
 
+from ..command.groups import ANCHOR, BOUNDARY_GROUP, FIXED, HANDLE, HIGH, LOW, ROLES, SOURCE, VALUE
 from ..operators.objects.counting import members
-from ..operators.objects.groups import (
-    ANCHOR,
-    BOUNDARY_GROUP,
-    FIXED,
-    HANDLE,
-    HIGH,
-    LOW,
-    ROLES,
-    SOURCE,
-    VALUE,
-    has_group,
-)
+from ..operators.objects.groups import has_group
 from ..operators.objects.reading import TYPES
 from ..operators.tools.convert import MESHFREE_OT_convert
 from . import colormaps

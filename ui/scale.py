@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-from ..operators.objects.ticks import round_ticks, tick_texts
-from ..operators.objects.units import attribute_power, unit
+from ..command.ticks import round_ticks, tick_texts
+from ..command.units import attribute_power, unit
 from .display import (
     color_node,
     find_material,

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ... import core
+from ...command.groups import ANCHOR
 from ...core import LaplacianOptions, PointCloudError
 from ..objects.counting import weighted_checksum
-from ..objects.groups import ANCHOR, chosen_weights, handle_names, is_chosen
+from ..objects.groups import chosen_weights, handle_names, is_chosen
 from ..objects.options import laplacian_options, settings_values
 from ..objects.reading import TYPES, boundary_points
 from ..objects.splats import has_splats, read_splats

@@ -8,6 +8,7 @@ from bpy.props import BoolProperty
 from mathutils import Vector
 
 from ... import core
+from ...command.groups import ANCHOR, HANDLE
 from ...core import PointCloudError
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import (
@@ -19,7 +20,7 @@ from ..objects.attributes import (
     write_own_positions,
 )
 from ..objects.carried import carried, shown_moved
-from ..objects.groups import ANCHOR, HANDLE, assign, check_assignable, group_weights, handle_names, has_group
+from ..objects.groups import assign, check_assignable, group_weights, handle_names, has_group
 from ..objects.handlers import notify
 from ..objects.modifiers import get_input
 from ..objects.place import activate

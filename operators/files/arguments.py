@@ -1,10 +1,8 @@
 """Options of the command line for properties of Blender."""
 
-import math
+from ...command.settings import Setting, place, radians
 
-import numpy as np
-
-from ...command.settings import Setting, place
+_UNITS = ("LENGTH", "AREA")
 
 
 def as_setting(item) -> Setting:
@@ -15,11 +13,8 @@ def as_setting(item) -> Setting:
     if item.type in {"BOOLEAN", "STRING"}:
         return Setting(name, description, item.default)
     if item.is_array:
-        return Setting(name, description, np.array(item.default_array), convert=place, form="X,Y,Z")
-    if item.subtype == "ANGLE":
-        return Setting(name, description, item.default, item.hard_min, item.hard_max, convert=_radians, form="DEGREES")
-    return Setting(name, description, item.default, item.hard_min, item.hard_max)
-
-
-def _radians(text):
-    return math.radians(float(text))
+        return Setting(name, description, tuple(item.default_array), convert=place, form="X,Y,Z")
+    if item.unit == "ROTATION":
+        return Setting(name, description, item.default, item.hard_min, item.hard_max, convert=radians, form="DEGREES")
+    form = item.unit if item.unit in _UNITS else ""
+    return Setting(name, description, item.default, item.hard_min, item.hard_max, form=form)

@@ -3,8 +3,8 @@
 import bpy
 
 from ...command import main, verbs
+from ...command.groups import SOURCE
 from .. import registration
-from ..objects.groups import SOURCE
 from .measure_verbs import MeasureFile, ProfileBetween, Section
 from .rigging import Rig
 from .tool_verbs import AlignWith, AlongCurve, CompareWith, Frames, FromSources, Mesh, Orient

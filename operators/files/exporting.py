@@ -11,6 +11,7 @@ from ... import core
 from ...command import analysis
 from ...command.clouds import save_arrays
 from ...command.rows import write_rows, write_text
+from ...command.svg import profile_picture
 from ...core import PointCloudError
 from ...core.files import replacing, write_points
 from ..objects.options import laplacian_options
@@ -27,7 +28,6 @@ from ..running.ready import reporting
 from ..tools.splats import SplatOperator
 from .objects import file_filter, point_table
 from .splats import splats_in_world, splats_to_write
-from .svg import profile_picture
 
 
 class ExportOperator(JobOperator, ExportHelper):

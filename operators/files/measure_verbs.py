@@ -1,23 +1,19 @@
 """Verbs that measure: parts, sections and profiles, whose outputs are tables."""
 
 import bpy
-import numpy as np
 
-from ... import core
+from ...command import profiles, sections
+from ...command.inputs import check_beside
 from ...command.rows import TABLES, write_rows, write_text
-from ...command.settings import as_place, place
-from ...core import PointCloudError
-from ...core.files import replacing
+from ...command.settings import as_place
+from ...command.svg import profile_picture
 from ..objects.place import place_of
 from ..tools.measures import MeasureParts
 from ..tools.profile import Profile
 from ..tools.sections import CrossSection
 from . import objects as files
 from . import opening
-from .svg import profile_picture
 from .verbs import LEFT_OUT, Apply
-
-_CURVES = "curve,closed,x,y,z", ["%d", "%d", "%.17g", "%.17g", "%.17g"]  # columns of a file of corners, and their form
 
 
 class MeasureFile(Apply):
@@ -64,18 +60,13 @@ class Section(Apply):
             help="position of the plane in the coordinates of the file, as --plane=X,Y,Z where X is below zero; or the"
             " name of an object of a .blend file, whose local XY plane cuts. Without it, the middle of the points",
         )
-        parser.add_argument(
-            "--normal", type=place, metavar="X,Y,Z", help="vector across the plane, if no object gives it; else upwards"
-        )
-        parser.add_argument(
-            "--curves", action="store_true", help="write the corners of the curves, too, beside the output: _curves.csv"
-        )
+        sections.add_options(parser, ", if no object gives it")
         super().add_options(parser)
 
     def check(self, parser, arguments):
         if arguments.normal is not None and arguments.plane and as_place(arguments.plane) is None:
             parser.error("--normal goes with a position, not with an object, whose plane has one")
-        _check_beside(parser, arguments, "curves")
+        check_beside(parser, arguments, "curves")
 
     def prepare(self, tool, obj, path, arguments):
         tool.plane = arguments.plane or ""
@@ -83,55 +74,19 @@ class Section(Apply):
         self._arguments = arguments
 
     def beside(self, output, arguments):
-        return [output.with_name(f"{output.stem}_curves.csv")] if arguments.curves else []
+        return [sections.corners_path(output)] if arguments.curves else []
 
     def save(self, tool, obj, output):
         if output.suffix.lower() == ".blend":
             opening.save_scene(output)
         else:
-            write_rows(output, _curve_records(tool.found))
+            write_rows(output, sections.curve_records(tool.found))
         for path in self.beside(output, self._arguments):
-            _save_corners(path, tool.found.curves, place_of(obj))
+            sections.write_corners(path, tool.found.curves, place_of(obj))
         return []
 
     def figures(self, tool, result):
-        found = tool.found
-        return {
-            "curves": len(found.curves),
-            "open_curves": sum(not curve.closed for curve in found.curves),
-            "length": found.length,
-            "enclosed_area": found.enclosed_area,
-        }
-
-
-def _curve_records(found):
-    """Return the measures of each curve by name, in world lengths; of a hole the area that it takes away."""
-    return [
-        {
-            "curve": number,
-            "length": curve.length,
-            "enclosed_area": abs(curve.enclosed_area),
-            "closed": int(curve.closed),
-            "hole": int(curve.enclosed_area < 0.0),
-        }
-        for number, curve in enumerate(found.curves, 1)
-    ]
-
-
-def _save_corners(output, curves, offset):
-    """Write the corners of curves in the coordinates of the file."""
-    columns = [
-        np.column_stack([np.full((len(curve.points), 2), (number, curve.closed)), curve.points + offset])
-        for number, curve in enumerate(curves, 1)
-    ]
-    with replacing(output) as part:
-        np.savetxt(part, np.concatenate(columns), _CURVES[1], ",", header=_CURVES[0], comments="")
-
-
-def _check_beside(parser, arguments, option):
-    """Refuse an option for a further file beside the output, if there is none."""
-    if getattr(arguments, option) and arguments.out is None and arguments.out_dir is None:
-        parser.error(f"--{option} writes a file beside the output: give --out or --out-dir, too")
+        return sections.figures(tool.found)
 
 
 class _SectionInFile(CrossSection):
@@ -142,11 +97,11 @@ class _SectionInFile(CrossSection):
 
     def cut(self, context, obj, reading):
         if self.place is not None:
-            return self.place - place_of(obj), (0.0, 0.0, 1.0) if self.normal is None else self.normal, ""
+            return self.place - place_of(obj), sections.UP if self.normal is None else self.normal, ""
         place, normal, guessed = super().cut(context, obj, reading)
         if self.normal is None:
             return place, normal, guessed
-        return place, self.normal, f"{obj.name} is cut through its middle: no --plane is given."
+        return place, self.normal, sections.through_middle(obj.name)
 
 
 class ProfileBetween(Apply):
@@ -158,35 +113,19 @@ class ProfileBetween(Apply):
         super().__init__("profile", _ProfileInFile)
 
     def add_options(self, parser):
-        for option, what in (("from", "begins"), ("to", "ends")):
-            parser.add_argument(
-                f"--{option}",
-                dest=f"path_{option}",
-                type=place,
-                required=True,
-                metavar="X,Y,Z",
-                help=f"position in the coordinates of the file, at whose nearest point the path {what}; as"
-                f" --{option}=X,Y,Z where X is below zero",
-            )
-        parser.add_argument(
-            "--svg", action="store_true", help="write a small picture, too, beside the output with the ending .svg"
-        )
+        profiles.add_options(parser)
         super().add_options(parser)
 
     def check(self, parser, arguments):
-        _check_beside(parser, arguments, "svg")
+        check_beside(parser, arguments, "svg")
 
     def beside(self, output, arguments):
-        return [output.with_suffix(".svg")] if arguments.svg else []
+        return [profiles.picture_path(output)] if arguments.svg else []
 
     def prepare(self, tool, obj, path, arguments):
-        self._arguments, places = arguments, np.array([arguments.path_from, arguments.path_to])
-        points = files.file_points(obj)
-        tool.rows = core.geometry.nearest_rows(points, places)
-        self._ends = points[tool.rows]
-        self._away = np.linalg.norm(self._ends - places, axis=1)
-        if tool.rows[0] == tool.rows[1]:
-            raise PointCloudError("The same point is the nearest one to both ends of the path. Give others.")
+        self._arguments = arguments
+        self._ends = profiles.nearest_ends(files.file_points(obj), [arguments.path_from, arguments.path_to])
+        tool.rows = self._ends.rows
 
     def save(self, tool, obj, output):
         if output.suffix.lower() == ".blend":
@@ -198,15 +137,7 @@ class ProfileBetween(Apply):
         return []
 
     def figures(self, tool, result):
-        distance, values, off, _ = result
-        return {
-            "length": float(distance[-1]),
-            "lowest": float(np.nanmin(values)),
-            "highest": float(np.nanmax(values)),
-            "uncertainty": float(np.sqrt(np.nanmean(off**2))),
-            "ends": self._ends.tolist(),
-            "distances_of_ends": self._away.tolist(),
-        }
+        return {**profiles.figures(result), **self._ends.figures}
 
 
 class _ProfileInFile(Profile):

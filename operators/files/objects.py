@@ -4,8 +4,8 @@ import bpy
 import numpy as np
 from bpy.props import StringProperty
 
+from ...command.groups import column_weights
 from ...command.quantities import NORMAL, PREFIX
-from ...core import PointCloudError
 from ...core.files import (
     READABLE,
     SPLATS,
@@ -186,21 +186,12 @@ def _read_colors(data):
 def group_of(obj, name):
     """Return the name of an object's group, added from the column of that name if a mesh has no such group.
 
-    Numbers from 0 to 1 become weights; of whole numbers all but 0 count.
+    Its numbers are weights as of `column_weights`.
     """
     column = None if obj.type != "MESH" or has_group(obj, name) else obj.data.attributes.get(name)
     if column is None or not _is_column(column):
         return name
-    weights = read_attribute(obj.data, name)
-    if weights.ndim > 1:
-        raise PointCloudError(f'The column "{name}" of "{obj.name}" holds vectors. Name one with a number a point.')
-    if weights.dtype.kind != "f":
-        weights = weights.astype(bool)
-    if not ((weights >= 0.0) & (weights <= 1.0)).all():
-        raise PointCloudError(
-            f'The column "{name}" of "{obj.name}" has numbers that are not from 0 to 1, so they are no weights. Name'
-            " another, or let it hold 1 for the points of the group and 0 for others."
-        )
+    weights = column_weights(read_attribute(obj.data, name), name, f'"{obj.name}"')
     return add_group(obj, f"{name} (column)", weights).name
 
 

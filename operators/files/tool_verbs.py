@@ -7,7 +7,10 @@ import numpy as np
 
 from ... import core
 from ...command import alignment, comparison
-from ...command.settings import as_place, place
+from ...command.groups import add_at, check_sources
+from ...command.orienting import imply_method
+from ...command.settings import as_place
+from ...command.source_verbs import add_curve
 from ...core.files import MESHES, READABLE, read_points, write_mesh
 from ..objects.attributes import point_count
 from ..objects.groups import assign
@@ -32,22 +35,12 @@ class FromSources(Apply):
     """A tool with source points: those of a group, or those nearest to given positions."""
 
     def add_options(self, parser):
-        parser.add_argument(
-            "--at",
-            type=place,
-            action="append",
-            metavar="X,Y,Z",
-            help="position in the coordinates of the file: the nearest point is a source. Give it once for each source,"
-            " as --at=X,Y,Z where X is below zero",
-        )
+        add_at(parser)
         super().add_options(parser)
 
     def check(self, parser, arguments):
-        if arguments.at and arguments.group:
-            parser.error("--at and --group both say which points are the sources: give one of them")
-        known = arguments.at or arguments.group or all(path.suffix.lower() == ".blend" for path in arguments.inputs)
-        if not known:  # other files have no default group and no selection
-            parser.error("nothing says which points are the sources: give --at X,Y,Z, or --group with a column's name")
+        # Other files have no default group and no selection.
+        check_sources(parser, arguments, within=all(path.suffix.lower() == ".blend" for path in arguments.inputs))
 
     def prepare(self, tool, obj, path, arguments):
         if arguments.at:
@@ -87,14 +80,7 @@ class AlongCurve(Apply):
         super().__init__("signed_distance", _SignedDistanceInFile)
 
     def add_options(self, parser):
-        parser.add_argument(
-            "--curve",
-            required=True,
-            metavar="FILE",
-            help=f"points of a curve on the surface in their order: {', '.join(READABLE)}; or the name of a curve"
-            " object of a .blend file",
-        )
-        parser.add_argument("--closed", action="store_true", help="join the last point of the file with the first")
+        add_curve(parser, "; or the name of a curve object of a .blend file")
         super().add_options(parser)
 
     def prepare(self, tool, obj, path, arguments):
@@ -269,13 +255,7 @@ class Orient(Apply):
         super().add_options(parser)
 
     def check(self, parser, arguments):
-        implied = {"VIEWPOINT": arguments.viewpoint, "ATTRIBUTE": arguments.source}
-        for method, value in implied.items():
-            if value and arguments.method is None:
-                arguments.method = method
-            elif value and arguments.method != method:
-                option = "--viewpoint" if method == "VIEWPOINT" else "--source"
-                parser.error(f"{option} goes with the method {method}, not {arguments.method}")
+        imply_method(parser, arguments)
 
     def prepare(self, tool, obj, path, arguments):
         tool.viewpoint = arguments.viewpoint or ""

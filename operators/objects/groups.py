@@ -4,19 +4,11 @@ import re
 
 import numpy as np
 
+from ...command.groups import HIGH, LOW, VALUE, check_enough
+from ...command.groups import is_chosen as _is_chosen
 from ...core import PointCloudError
 from .attributes import point_count, read_attribute, tag_changed, write_attribute
 
-HANDLE, ANCHOR, FIXED, SOURCE, LOW, HIGH, VALUE, BOUNDARY_GROUP = ROLES = (
-    "Handle",
-    "Anchor",
-    "Fixed",
-    "Source",
-    "Low",
-    "High",
-    "Value",
-    "Boundary",
-)
 _GIVEN = LOW, HIGH, VALUE  # a point has one value
 _WEIGHTS = ("BOOLEAN", "FLOAT")  # types of attributes that can be groups of a point cloud
 
@@ -64,7 +56,7 @@ def group_weights(obj, name: str, outside=0.0):
 
 def is_chosen(obj, name: str, default: str) -> bool:
     """Whether a setting names a group that must exist: any but the default, which may be missing."""
-    return bool(name) and (has_group(obj, name) or name != default)
+    return _is_chosen(name, default, has_group(obj, name))
 
 
 def chosen_weights(obj, name: str, setting: str, least: int = 1, outside=0.0):
@@ -101,12 +93,7 @@ def chosen_weights(obj, name: str, setting: str, least: int = 1, outside=0.0):
         what = kind if obj.type == "MESH" else f"{kind} of truth values or numbers on points"
         raise PointCloudError(f'"{obj.name}" has no {what} named "{name}". Choose another {setting}, or clear it.')
     weights = group_weights(obj, name, outside)
-    count = np.count_nonzero(weights > 0.0)
-    if count < least:
-        raise PointCloudError(
-            f'The {kind} "{name}" gives {count} of {len(weights)} points a weight above zero, and {setting}'
-            f" takes at least {least}. Assign points to it in Edit Mode, or clear {setting}."
-        )
+    check_enough(weights, f'{kind} "{name}"', setting, least, " in Edit Mode")
     return weights
 
 

@@ -1,7 +1,5 @@
 """The modifier of a motion: a formula of the time over modes, and displacement along the normals."""
 
-from typing import NamedTuple
-
 import bpy
 import numpy as np
 
@@ -19,45 +17,6 @@ _INPUTS = (
     (_FIRST, "Int", "Frame of the scene with which the motion begins"),
     (_FRAMES, "Int", "Frames of the scene from the beginning to the end", {"default_value": 1, "min_value": 1}),
 )
-
-
-class Formula(NamedTuple):
-    """A motion as a sum of modes, with the time from 0 at the first frame of the scene to 1 at the last.
-
-    Each start adds to the amplitude of a mode its share times a function of the time since then.
-
-    Attributes
-    ----------
-    function : {"COSINE", "EXPONENT"}
-        Of nodes: ``cos(rate * time)``, or ``exp(rate * time)``.
-    rates : ndarray, (k,)
-    modes : ndarray, (n, k)
-    starts : ndarray, (j,)
-        Times, ascending.
-    shares : ndarray, (j, k)
-    """
-
-    function: str
-    rates: np.ndarray
-    modes: np.ndarray
-    starts: np.ndarray
-    shares: np.ndarray
-
-    @property
-    def is_single(self) -> bool:
-        """Whether all starts at the time zero, so that nodes need no more than the function."""
-        return len(self.starts) == 1 and self.starts[0] == 0.0
-
-    def amplitudes(self, time: float):
-        """Return the amplitudes of the modes at a time, (k,)."""
-        begun = self.starts <= max(time, 0.0)
-        since = max(time, 0.0) - self.starts[begun]
-        function = {"COSINE": np.cos, "EXPONENT": np.exp}[self.function]
-        return np.sum(self.shares[begun] * function(np.multiply.outer(since, self.rates)), axis=0)
-
-    def at(self, time: float):
-        """Return the motion at a time, (n,)."""
-        return self.modes @ self.amplitudes(time)
 
 
 def mode_name(number: int) -> str:

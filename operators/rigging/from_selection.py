@@ -5,15 +5,16 @@ import numpy as np
 from bpy.props import EnumProperty, FloatProperty, StringProperty
 
 from ... import core
+from ...command.groups import LOW, unreached
 from ...command.quantities import WEIGHT
 from ...core import PointCloudError
 from ..objects.attributes import tag_changed, write_attribute
-from ..objects.groups import LOW, check_assignable, chosen_members, group_weights, has_group, put_group
+from ..objects.groups import check_assignable, chosen_members, group_weights, has_group, put_group
 from ..objects.result import length_text
 from ..registration import Registration, Row
 from ..running import cache
 from ..running.application import ShownOperator, Tool, operator_reader
-from ..tools.select import groups_changed, selected, unreached
+from ..tools.select import groups_changed, selected
 from .painting import WeightOperator
 
 _SHARE = 0.25  # of the diagonal of the points: the default radius
@@ -160,7 +161,7 @@ class WeightsFromSelection(Tool):
         groups_changed(obj)
         some = np.count_nonzero(weights > 0.0)
         line = f'{obj.name}: {some:,} of {len(weights):,} points are in "{self.name}", {told}'
-        return [*unreached(obj, reached, "Their weight is 0."), line]
+        return [*unreached(reached, obj.name, "Their weight is 0."), line]
 
 
 class MESHFREE_OT_weights_from_selection(WeightsFromSelection, WeightOperator, ShownOperator, bpy.types.Operator):

@@ -4,22 +4,15 @@ import bpy
 import numpy as np
 from bpy.props import FloatProperty, FloatVectorProperty, StringProperty
 
-from ... import core
+from ...command import along
 from ...command.quantities import CELL, DIRECTION, SIGNED_DISTANCE, UV
 from ...core import PointCloudError
 from ..objects.attributes import tag_changed, write_attribute
-from ..objects.groups import SOURCE
 from ..objects.result import length_text
 from ..registration import Registration, Row
 from ..running import cache
 from ..running.application import ShownOperator, Tool, operator_reader
-from .select import read_sources, unreached
-
-OUTSIDE = -1.0  # texture coordinates of points that the map does not reach
-
-
-def _transport(laplacian, progress):
-    return cache.result(laplacian, "transport", compute=lambda: core.Transport(laplacian, progress=progress))
+from .select import read_sources
 
 
 class NearestSource(Tool):
@@ -28,33 +21,19 @@ class NearestSource(Tool):
     writes = (CELL,)
     asks = ("group", "show")
 
-    group: StringProperty(
-        name="Sources",
-        description="Vertex group with the points that are centers of cells; where there is none of that name, the"
-        " points selected in Edit Mode",
-        default=SOURCE,
-    )
+    group: StringProperty(name="Sources", **along.NEAREST["group"].keywords)
 
     def plan(self, context, obj):
         sources = read_sources(obj, self.group)
         _, operator = operator_reader(context, obj)
 
-        def compute(progress):
-            laplacian = operator(progress)
-            return cache.result(
-                laplacian,
-                "cells",
-                sources,
-                compute=lambda: cache.geodesics(laplacian, progress).nearest_source(sources, progress=progress),
-            )
-
-        return compute
+        return lambda progress: along.cells(operator(progress), sources, cache, progress)
 
     def write(self, context, obj, result):
-        write_attribute(obj.data, CELL, result)
+        told = along.told_cells(result, obj.name)
+        write_attribute(obj.data, CELL, told.values)
         tag_changed(obj.data)
-        count = len(np.unique(result[result >= 0]))
-        return [*unreached(obj, result >= 0, "Their cell is -1."), f"{obj.name}: {count:,} cells"]
+        return [*told.notices, told.line]
 
 
 class MESHFREE_OT_nearest_source(NearestSource, ShownOperator, bpy.types.Operator):
@@ -72,60 +51,24 @@ class Unwrap(Tool):
     adjustable = ("radius", "angle", "show")
     at_zero = {"radius": "All Points"}
 
-    group: StringProperty(
-        name="Center",
-        description="Vertex group around the center of the texture, which is the point nearest to the mean of its"
-        " points; where there is none of that name, the points selected in Edit Mode",
-        default=SOURCE,
-    )
-    radius: FloatProperty(
-        name="Radius",
-        description="Distance along the surface from the center of the texture to its border; 0 for all points",
-        default=0.0,
-        min=0.0,
-        subtype="DISTANCE",
-    )
-    angle: FloatProperty(
-        name="Angle", description="Rotation of the texture about its center", default=0.0, subtype="ANGLE"
-    )
+    group: StringProperty(name="Center", **along.UNWRAP["group"].keywords)
+    radius: FloatProperty(name="Radius", subtype="DISTANCE", **along.UNWRAP["radius"].keywords)
+    angle: FloatProperty(name="Angle", subtype="ANGLE", **along.UNWRAP["angle"].keywords)
 
     def plan(self, context, obj):
         if np.isnan(self.radius):
             raise PointCloudError("The radius of the texture is not a number. Use one from 0 on.")
-        sources = np.flatnonzero(read_sources(obj, self.group))
+        sources = read_sources(obj, self.group)
         reading, operator = operator_reader(context, obj)
-        points = reading.points[sources]
-        center = int(sources[np.linalg.norm(points - points.mean(axis=0), axis=1).argmin()])
-        radius, rotation = self.radius, np.exp(1j * self.angle)
-
-        def compute(progress):
-            laplacian = operator(progress)
-            if laplacian.component[center] < 0:
-                raise PointCloudError(
-                    f'The center is a point of "{obj.name}" that the operator left out, because it is an outlier.'
-                    " Choose a point of the surface."
-                )
-            place = cache.result(
-                laplacian,
-                "map",
-                center,
-                compute=lambda: _transport(laplacian, progress).logarithmic_map(
-                    center, geodesics=cache.geodesics(laplacian, progress), progress=progress
-                ),
-            )
-            reached = np.isfinite(place[:, 0])
-            place = place @ [1.0, 1.0j]
-            border = radius or np.abs(place[reached]).max()
-            texture = 0.5 + 0.5j + 0.5 * rotation * place / border
-            return np.where(reached[:, None], np.column_stack([texture.real, texture.imag]), OUTSIDE), border
-
-        return compute
+        center = along.center_of(reading.points, sources)
+        radius, angle, name = self.radius, self.angle, obj.name
+        return lambda progress: along.texture(operator(progress), center, radius, angle, name, cache, progress)
 
     def write(self, context, obj, result):
         texture, border = result
         write_attribute(obj.data, UV, texture)
         tag_changed(obj.data)
-        return [f"{obj.name}: texture coordinates up to {length_text(border)} from the center"]
+        return [along.texture_line(border, obj.name, length_text)]
 
 
 class MESHFREE_OT_unwrap(Unwrap, ShownOperator, bpy.types.Operator):
@@ -141,19 +84,9 @@ class ExtendDirection(Tool):
     writes = (DIRECTION,)
     asks = ("group", "direction", "show")
 
-    group: StringProperty(
-        name="Sources",
-        description="Vertex group with the points that have the direction; where there is none of that name, the points"
-        " selected in Edit Mode",
-        default=SOURCE,
-    )
+    group: StringProperty(name="Sources", **along.EXTEND["group"].keywords)
     direction: FloatVectorProperty(
-        name="Direction",
-        description="Direction at these points, along the axes of the world; projected onto the surface",
-        default=(0.0, 0.0, -1.0),
-        min=-1e6,
-        max=1e6,
-        subtype="XYZ",
+        name="Direction", min=-1e6, max=1e6, subtype="XYZ", **along.EXTEND["direction"].keywords
     )
 
     def plan(self, context, obj):
@@ -162,26 +95,16 @@ class ExtendDirection(Tool):
         direction = np.array(self.direction, dtype=np.float64)
 
         def compute(progress):
-            laplacian = operator(progress)
-            found = cache.result(
-                laplacian,
-                "directions",
-                sources,
-                direction,
-                compute=lambda: _transport(laplacian, progress).extend(sources, direction, progress=progress),
-            )
-            reached = found.any(axis=1)
-            result = np.zeros_like(found)
-            result[reached] = reading.local_directions(found[reached])
-            return result
+            found = along.directions(operator(progress), sources, direction, cache, progress)
+            return along.unit_directions(found, reading.local)
 
         return compute
 
     def write(self, context, obj, result):
-        write_attribute(obj.data, DIRECTION, result)
+        told = along.told_directions(result, obj.name)
+        write_attribute(obj.data, DIRECTION, told.values)
         tag_changed(obj.data)
-        notices = unreached(obj, result.any(axis=1), "They have no direction.")
-        return [*notices, f"{obj.name}: directions on {len(result):,} points"]
+        return [*told.notices, told.line]
 
 
 class MESHFREE_OT_extend_direction(ExtendDirection, ShownOperator, bpy.types.Operator):
@@ -204,27 +127,8 @@ class SignedDistance(Tool):
 
     def plan(self, context, obj):
         places, closed = self.read_curve(context, obj)
-        reading, operator = operator_reader(context, obj)
-
-        def compute(progress):
-            laplacian = operator(progress)
-            known = np.flatnonzero(laplacian.component >= 0)
-            nearest = known[core.geometry.nearest_rows(reading.points[known], places)]
-            _, first = np.unique(nearest, return_index=True)
-            curve = nearest[np.sort(first)]
-            if len(curve) < 2:
-                raise PointCloudError("All of the curve lies at one point of the cloud. Draw it along the surface.")
-            return cache.result(
-                laplacian,
-                "sides of a curve",
-                curve,
-                closed,
-                compute=lambda: cache.geodesics(laplacian, progress).signed_distance(
-                    curve, closed and len(curve) > 2, progress=progress
-                ),
-            )
-
-        return compute
+        _, operator = operator_reader(context, obj)
+        return lambda progress: along.beside_curve(operator(progress), places, closed, cache, progress)
 
     def read_curve(self, context, obj):
         """Return the points of the curve, (k, 3), relative to the object's location, and whether it is closed."""
@@ -232,12 +136,10 @@ class SignedDistance(Tool):
         return places - np.array(obj.matrix_world.translation), closed  # as points are read
 
     def write(self, context, obj, result):
-        reached = np.isfinite(result)
-        write_attribute(obj.data, SIGNED_DISTANCE, np.where(reached, result, 0.0))
+        told = along.told_sides(result, obj.name, length_text)
+        write_attribute(obj.data, SIGNED_DISTANCE, told.values)
         tag_changed(obj.data)
-        low, high = (length_text(value) for value in (result[reached].min(), result[reached].max()))
-        notices = unreached(obj, reached, "Their distance is 0.")
-        return [*notices, f"{obj.name}: {low} on the right to {high} on the left"]
+        return [*told.notices, told.line]
 
 
 class MESHFREE_OT_signed_distance(SignedDistance, ShownOperator, bpy.types.Operator):

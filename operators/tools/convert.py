@@ -6,12 +6,13 @@ from contextlib import contextmanager
 import bpy
 from bpy.props import EnumProperty
 
+from ...command.groups import ROLES
 from ...core import PointCloudError
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import SELECTION, point_count, remove_attributes, write_attribute
 from ..objects.counting import renew_counts
 from ..objects.evaluated import POINTCLOUDS_SINCE, shown_as_own, shown_points
-from ..objects.groups import ROLES, add_group, group_weights, handle_names, has_group
+from ..objects.groups import add_group, group_weights, handle_names, has_group
 from ..objects.modifiers import inputs_of, is_display, put_inputs, set_input
 from ..objects.place import activate
 from ..objects.result import check_writable

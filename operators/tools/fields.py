@@ -4,18 +4,19 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty, FloatProperty, StringProperty
 
-from ... import core
+from ...command import along, fields
 from ...command.quantities import DISTANCE, FIELD
-from ...core import PointCloudError
 from ..objects.attributes import point_count, read_attribute, tag_changed, write_attribute
-from ..objects.groups import HIGH, LOW, SOURCE, VALUE, chosen_weights, group_kind, has_group, is_chosen
+from ..objects.groups import chosen_weights, group_kind, has_group
 from ..objects.result import length_text
 from ..registration import Registration, Row
 from ..running import cache
 from ..running.application import ShownOperator, Tool, operator_reader
-from .select import read_sources, unreached
+from .select import read_sources
 
-UNREACHED = -1.0  # distance of points that no source reaches
+_HOW = (
+    "Select those of one end in Edit Mode and press Assign to Low, and those of the other end and press Assign to High."
+)
 
 
 class HarmonicField(Tool):
@@ -25,27 +26,19 @@ class HarmonicField(Tool):
 
     values: EnumProperty(
         name="Values",
-        description="Where the given values come from",
         items=[
             ("AUTO", "All Groups", "From all of the groups below that are there"),
             ("WEIGHTS", "Weights", "The points of one group have their weights as values"),
             ("GROUPS", "Two Groups", "The points of each of two groups have one value"),
         ],
-        default="AUTO",
+        **fields.HARMONIC["values"].keywords,
     )
-    low_group: StringProperty(
-        name="Low Group", description="Vertex group of the points with the low value", default=LOW
-    )
-    high_group: StringProperty(
-        name="High Group", description="Vertex group of the points with the high value", default=HIGH
-    )
-    group: StringProperty(name="Group", description="Vertex group whose weights are the values", default=VALUE)
-    low: FloatProperty(name="Low Value", description="Value of the low group, or of weight 0", default=0.0)
-    high: FloatProperty(name="High Value", description="Value of the high group, or of weight 1", default=1.0)
-    source: StringProperty(
-        name="Source",
-        description="Attribute with the source f of Poisson's equation -Laplacian u = f; empty for a harmonic field",
-    )
+    low_group: StringProperty(name="Low Group", **fields.HARMONIC["low_group"].keywords)
+    high_group: StringProperty(name="High Group", **fields.HARMONIC["high_group"].keywords)
+    group: StringProperty(name="Group", **fields.HARMONIC["group"].keywords)
+    low: FloatProperty(name="Low Value", **fields.HARMONIC["low"].keywords)
+    high: FloatProperty(name="High Value", **fields.HARMONIC["high"].keywords)
+    source: StringProperty(name="Source", **fields.HARMONIC["source"].keywords)
 
     @property
     def asks(self):
@@ -61,92 +54,32 @@ class HarmonicField(Tool):
 
     def plan(self, context, obj):
         shares = self._shares(obj)
-        fixed = np.isfinite(shares)
         source = None
         if self.source:
             source = read_attribute(obj.data, self.source).astype(np.float64)
-            if source.ndim > 1:
-                raise PointCloudError(
-                    f'The attribute "{self.source}" of "{obj.name}" holds vectors. Choose one with a number'
-                    " for each point as the source."
-                )
+            fields.check_source(source, self.source, f'"{obj.name}"')
         _, operator = operator_reader(context, obj)
         low, high = self.low, self.high
-
-        def compute(progress):
-            laplacian, given = operator(progress), shares[fixed]
-            if source is None:  # between 0 and 1, so that both values can change without solving again
-                field = cache.result(
-                    laplacian,
-                    "harmonic",
-                    fixed,
-                    given,
-                    compute=lambda: core.harmonic_field(laplacian, fixed, given, progress=progress),
-                )
-                return low + (high - low) * field
-            values = low + (high - low) * given
-            return cache.result(
-                laplacian,
-                "poisson",
-                source,
-                fixed,
-                values,
-                compute=lambda: core.solve_poisson(laplacian, source, fixed, values, progress=progress),
-            )
-
-        return compute
+        return lambda progress: fields.solved(operator(progress), shares, source, low, high, cache, progress)
 
     def _shares(self, obj):
         """Return the given values relative to the low (0) and the high value (1), (n,); NaN where none is given."""
-        shares, known = np.full(point_count(obj.data), np.nan), {}
-        for setting, share in self._given(obj).items():
-            name, title = getattr(self, setting), setting.replace("_", " ").title()
-            weights = chosen_weights(obj, name, title, least=int(self.values == "GROUPS"), outside=np.nan)
-            held = np.isfinite(weights) if share is None else weights > 0.0  # a value may be a weight of 0, too
-            for other, there in known.items():
-                both = np.count_nonzero(held & there)
-                if both:
-                    raise PointCloudError(f'{both} points are both in "{other}" and in "{name}". Remove them from one.')
-            known[name] = held
-            shares[held] = weights[held] if share is None else share
-        if self.group or not self.source:
-            self._check_given(obj, {name for name, held in known.items() if held.any()})
-        return shares
 
-    def _given(self, obj):
-        """Return the settings whose groups give values, with the relative values, None for the weights."""
-        ends, weights = {"low_group": 0.0, "high_group": 1.0}, {"group": None}
-        if self.values == "GROUPS":
-            return ends
-        if self.values == "WEIGHTS" or self.group not in ("", VALUE):
-            return weights if self.group or not self.source else {}
-        every = ends | weights
-        defaults = dict(zip(every, (LOW, HIGH, VALUE), strict=True))
-        return {name: every[name] for name in every if is_chosen(obj, getattr(self, name), defaults[name])}
+        def has(name):
+            return has_group(obj, name)
 
-    def _check_given(self, obj, names):
-        """Refuse missing values, or those of one end alone, by the names of the groups that hold points."""
-        if not names and has_group(obj, self.group):
-            raise PointCloudError(
-                f'The {group_kind(obj)} "{self.group}" of "{obj.name}" holds no points. Assign some to it in Edit Mode.'
-            )
-        if not names:
-            raise PointCloudError(
-                f'"{obj.name}" has no points with given values. Select those of one end in Edit Mode and press Assign'
-                " to Low, and those of the other end and press Assign to High."
-            )
-        ends = {self.low_group, self.high_group}
-        if self.values == "AUTO" and len(names) == 1 and names < ends and not self.source:
-            (missing,) = ends - names
-            raise PointCloudError(
-                f'Only the {group_kind(obj)} "{min(names)}" of "{obj.name}" gives values, so that all would be the'
-                f' same. Assign points to "{missing}", too.'
-            )
+        least = int(self.values == "GROUPS")
+        weights = {
+            setting: chosen_weights(obj, getattr(self, setting), fields.title(setting), least, outside=np.nan)
+            for setting in fields.giving(self, has)
+        }
+        count, kind = point_count(obj.data), group_kind(obj)
+        return fields.given_shares(self, weights, count, kind, f'"{obj.name}"', _HOW, has)
 
     def write(self, context, obj, result):
         write_attribute(obj.data, FIELD, result)
         tag_changed(obj.data)
-        return [f"{obj.name}: a field from {result.min():.4g} to {result.max():.4g}"]
+        return [fields.field_line(result, obj.name)]
 
 
 class MESHFREE_OT_harmonic_field(HarmonicField, ShownOperator, bpy.types.Operator):
@@ -162,38 +95,19 @@ class GeodesicDistance(Tool):
     writes = (DISTANCE,)
     asks = ("group", "show")
 
-    group: StringProperty(
-        name="Sources",
-        description="Vertex group of the sources; where there is none of that name, the points selected in Edit Mode",
-        default=SOURCE,
-    )
+    group: StringProperty(name="Sources", **along.GEODESIC["group"].keywords)
 
     def plan(self, context, obj):
         sources = read_sources(obj, self.group)
-        if sources.all():
-            raise PointCloudError(
-                f'All points of "{obj.name}" are sources, so that all distances are 0. Select fewer of them in'
-                " Edit Mode, or choose a smaller group."
-            )
+        along.check_distances(sources, obj.name)
         _, operator = operator_reader(context, obj)
-
-        def compute(progress):
-            laplacian = operator(progress)
-            return cache.result(
-                laplacian,
-                "distance",
-                sources,
-                compute=lambda: cache.geodesics(laplacian, progress).distance(sources, progress=progress),
-            )
-
-        return compute
+        return lambda progress: along.distance(operator(progress), sources, cache, progress)
 
     def write(self, context, obj, result):
-        reached = np.isfinite(result)
-        write_attribute(obj.data, DISTANCE, np.where(reached, result, UNREACHED))
+        told = along.told_distance(result, obj.name, length_text)
+        write_attribute(obj.data, DISTANCE, told.values)
         tag_changed(obj.data)
-        notices = unreached(obj, reached, f"Their distance is {UNREACHED:g}.")
-        return [*notices, f"{obj.name}: distances up to {length_text(result[reached].max())}"]
+        return [*told.notices, told.line]
 
 
 class MESHFREE_OT_geodesic_distance(GeodesicDistance, ShownOperator, bpy.types.Operator):

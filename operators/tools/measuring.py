@@ -7,6 +7,7 @@ import numpy as np
 from bpy.props import BoolProperty, FloatProperty
 
 from ... import core
+from ...command.profiles import path_between
 from ...core import PointCloudError
 from ..objects.curves import add_curves
 from ..objects.planes import plane_of
@@ -200,7 +201,7 @@ class MESHFREE_OT_geodesic_path(SelectionOperator, bpy.types.Operator):
     def prepare(self, context, obj):
         ends = selected_ends(obj)
         reading, laplacian = analyzed(context, obj)
-        path = path_between(laplacian, ends)
+        path = path_between(laplacian, ends, cache, lambda *_: None)
         straight = length_text(core.polygon_length(laplacian.points[ends]))
         line = f"{length_text(core.polygon_length(path))} along the surface, {straight} straight"
 
@@ -221,16 +222,6 @@ def selected_ends(obj):
             f'{len(ends):,} points of "{obj.name}" are selected. Select the two between which the path leads.'
         )
     return ends
-
-
-def path_between(laplacian, ends, progress=lambda *_: None):
-    """Return the corners of the shortest path between two points, (k, 3), as points are read."""
-    return cache.result(
-        laplacian,
-        "path",
-        ends,
-        compute=lambda: core.geodesic_path(laplacian, *ends.tolist(), geodesics=cache.geodesics(laplacian, progress)),
-    )
 
 
 TOOLS = (

@@ -4,8 +4,9 @@ import bpy
 from bpy.props import FloatProperty, IntProperty, StringProperty
 
 from ... import core
-from ...core import Cancelled, PointCloudError
-from ..objects.groups import FIXED, chosen_members, group_kind, is_chosen
+from ...command import minimal
+from ...command.groups import FIXED
+from ..objects.groups import chosen_members, group_kind, is_chosen
 from ..objects.options import default_options, laplacian_options
 from ..objects.positions import check_movable, target_property, write_positions
 from ..objects.reading import read_points
@@ -16,8 +17,6 @@ from ..running import cache
 from ..running.application import ApplicationOperator, Tool, build_operator
 from ..running.discs import disc_finder
 
-HISTORY = "lb_area_history"  # custom property of the object: area after each step
-
 
 class MinimalSurface(Tool):
     """The settings and the work of `meshfree.minimal_surface`."""
@@ -25,21 +24,9 @@ class MinimalSurface(Tool):
     asks = ("group", "tolerance", "steps", "target")
     adjustable = ("target",)
 
-    group: StringProperty(
-        name="Fixed",
-        description="Vertex group with the points that stay, every boundary at least; where there is none of that"
-        " name, the detected boundaries",
-        default=FIXED,
-    )
-    tolerance: FloatProperty(
-        name="Tolerance",
-        description="Stops when a step changes the area by a smaller fraction than this",
-        default=1e-4,
-        min=0.0,
-        soft_max=0.01,
-        precision=6,
-    )
-    steps: IntProperty(name="Steps", description="Maximum number of steps", default=100, min=1, soft_max=500)
+    group: StringProperty(name="Fixed", **minimal.MINIMAL["group"].keywords)
+    tolerance: FloatProperty(name="Tolerance", soft_max=0.01, precision=6, **minimal.MINIMAL["tolerance"].keywords)
+    steps: IntProperty(name="Steps", soft_max=500, **minimal.MINIMAL["steps"].keywords)
     target: target_property()
 
     def plan(self, context, obj):
@@ -56,13 +43,9 @@ class MinimalSurface(Tool):
             boundary = fixed
             if boundary is None:
                 boundary = build_operator(reading, options, progress).laplacian.boundary
-                if not boundary.any():
-                    raise PointCloudError(
-                        f'"{name}" has no boundary, so that its surface would shrink to nothing. Assign the points'
-                        f' that stay to the {kind} "{FIXED}".'
-                    )
+                minimal.check_boundary(boundary, kind, name)
             settings = (reading.points, boundary, tolerance, steps, motion)
-            film = cache.fetch(cache.content("film", *settings), lambda: _shrink(*settings, progress))
+            film = cache.fetch(cache.content("film", *settings), lambda: minimal.shrink(*settings, progress))
             gradients = None
             if carries:
                 laplacian = build_operator(reading, options, progress).laplacian
@@ -75,10 +58,8 @@ class MinimalSurface(Tool):
         reading, film, gradients, discs = result
         if film.steps:
             write_positions(obj, reading, film.points, self.target, "Minimal Surface", gradients, discs)
-        obj[HISTORY] = film.area_history.tolist()
-        area = film.area_history[-1] if film.steps else film.initial_area
-        areas = f"from {area_text(film.initial_area)} to {area_text(float(area))}"
-        return [*film.notices, f"{obj.name}: area {areas} in {film.steps} steps ({film.reason})"]
+        obj[minimal.HISTORY] = film.area_history.tolist()
+        return [*film.notices, minimal.film_line(film, obj.name, area_text)]
 
 
 class MESHFREE_OT_minimal_surface(MinimalSurface, ApplicationOperator, bpy.types.Operator):
@@ -86,31 +67,6 @@ class MESHFREE_OT_minimal_surface(MinimalSurface, ApplicationOperator, bpy.types
 
     bl_idname = "meshfree.minimal_surface"
     bl_label = "Minimal Surface"
-
-
-def _shrink(points, boundary, tolerance, steps, options, progress):
-    """Compute the minimal surface of a boundary, with the fraction of the steps as progress."""
-    count = 0
-
-    def stepped(step, points, area):
-        nonlocal count
-        count = step
-
-    def report(stage, fraction):
-        progress("Steps", min(1.0, (count + fraction) / steps))
-
-    film = core.minimal_surface(
-        points,
-        boundary,
-        epsilon=tolerance,
-        max_steps=steps,
-        options=options,
-        callback=stepped,
-        progress=report,
-    )
-    if film.reason == "cancelled":  # it must not be cached
-        raise Cancelled
-    return film
 
 
 TOOLS = (

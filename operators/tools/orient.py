@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
-from ... import core
+from ...command import orienting
 from ...command.analysis import WRITE_LIMIT
 from ...command.quantities import AREA, NORMAL, ORIENTATION, RESULTS
 from ...core import PointCloudError
@@ -27,7 +27,6 @@ class OrientNormals(Tool):
 
     method: EnumProperty(
         name="Method",
-        description="How the side is found",
         items=[
             ("WINDING", "Winding Number", "By the generalized winding number, through gaps and in noise"),
             (
@@ -40,41 +39,35 @@ class OrientNormals(Tool):
             ("ATTRIBUTE", "Attribute", "By a vector of each point, such as the scanner position"),
             ("KEEP", "As They Are", "Keep the present side, to flip it"),
         ],
-        default="WINDING",
+        **orienting.ORIENT["method"].keywords,
     )
     viewpoint: StringProperty(
         name="Viewpoint", description="Object that saw the points, for Viewpoint; empty for the scene's camera"
     )
-    source: StringProperty(name="Attribute", description="Vector attribute, for Attribute")
+    source: StringProperty(name="Attribute", **orienting.ORIENT["source"].keywords)
     holds: EnumProperty(
         name="Attribute Holds",
-        description="Meaning of the vectors of the attribute",
         items=[
             ("POSITIONS", "Positions", "Positions in local coordinates from which the points were seen"),
             ("DIRECTIONS", "Directions", "Directions to the outer side, such as normals from a file"),
         ],
-        default="POSITIONS",
+        **orienting.ORIENT["holds"].keywords,
     )
-    flip: BoolProperty(name="Flip", description="Reverse all normals afterwards", default=False)
+    flip: BoolProperty(name="Flip", **orienting.ORIENT["flip"].keywords)
 
     def plan(self, context, obj):
         reading = read_points(context, obj)
-        method, sign = self.method, -1.0 if self.flip else 1.0
+        method, flip = self.method, self.flip
         viewpoint = self.viewpoints(context, obj, reading)
-        core_method = {"WINDING": "winding", "OUTSIDE": "outside"}.get(method, "viewpoint")
 
         def orient(measured, progress):
             laplacian, normals, areas = measured.built.laplacian, measured.measures[NORMAL], measured.measures[AREA]
-            if method == "KEEP":
-                return sign * normals
             progress("Orientation", 0.9)
 
-            def compute():
-                return core.orient_normals(
-                    reading.points, normals, method=core_method, viewpoint=viewpoint, areas=areas
-                )
+            def keep(name, viewpoint, compute):
+                return cache.result(laplacian, "sides", reading.points, name, viewpoint, compute=compute)
 
-            return sign * cache.result(laplacian, "sides", reading.points, core_method, viewpoint, compute=compute)
+            return orienting.outward(reading.points, normals, areas, method, viewpoint, flip, keep)
 
         return plan_analysis(context, obj, orient=orient)
 
@@ -89,10 +82,9 @@ class OrientNormals(Tool):
 
     def write(self, context, obj, result):
         before = obj.data.attributes.get(NORMAL)
-        count = None if before is None else _count_reversed(read_attribute(obj.data, NORMAL), result.local_normals)
+        earlier = None if before is None else read_attribute(obj.data, NORMAL)
         write_result(obj, result, WRITE_LIMIT, oriented=True)
-        done = "normals oriented" if count is None else f"{count:,} of {len(result.local_normals):,} normals reversed"
-        return [*result.notices, f"{obj.name}: {done}"]
+        return [*result.notices, orienting.reversed_line(earlier, result.local_normals, obj.name)]
 
 
 class MESHFREE_OT_orient_normals(OrientNormals, ShownOperator, bpy.types.Operator):
@@ -100,11 +92,6 @@ class MESHFREE_OT_orient_normals(OrientNormals, ShownOperator, bpy.types.Operato
 
     bl_idname = "meshfree.orient_normals"
     bl_label = "Orient Normals"
-
-
-def _count_reversed(before, after):
-    """Count normals that have been reversed."""
-    return int(np.count_nonzero(np.einsum("ij,ij->i", before, after) < 0.0))
 
 
 def _place(context, obj, name):
@@ -121,10 +108,7 @@ def _vectors(obj, name):
     if not name:
         raise PointCloudError("No attribute is chosen to orient normals by. Choose one with a vector for each point.")
     vectors = read_attribute(obj.data, name).astype(np.float64)
-    if vectors.ndim != 2:
-        raise PointCloudError(
-            f'The attribute "{name}" of "{obj.name}" holds no vectors. Choose one with a vector for each point.'
-        )
+    orienting.check_vectors(vectors, name, f'"{obj.name}"')
     return vectors
 
 

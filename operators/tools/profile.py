@@ -1,25 +1,23 @@
 """Profile: the height or an attribute along the shortest path between two points, as a curve and a table."""
 
-import csv
-import io
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
 from bpy.props import EnumProperty, StringProperty
 
-from ... import core
+from ...command import profiles
 from ...core import PointCloudError
 from ..objects.attributes import read_attribute
 from ..objects.curves import plot
 from ..objects.place import place_of
 from ..objects.result import length_text
 from ..registration import Registration, Row
+from ..running import cache
 from ..running.application import Tool, operator_reader
 from ..running.stages import Stages
-from .measuring import path_between, selected_ends
+from .measuring import selected_ends
 from .select import SelectionOperator
-
-_AXES = "XYZ"
 
 
 class Profile(Tool):
@@ -29,14 +27,11 @@ class Profile(Tool):
     asks = ("source", "axis")
     table = ""  # what was measured, as text with commas
 
-    source: StringProperty(
-        name="Attribute", description="Attribute of one number at each point; without one, the height along the axis"
-    )
+    source: StringProperty(name="Attribute", **profiles.PROFILE["source"].keywords)
     axis: EnumProperty(
         name="Height Along",
-        description="Axis of the world along which heights are measured",
-        items=[(axis, axis, f"Along the {axis} axis of the world") for axis in _AXES],
-        default="Z",
+        items=[(axis, axis, f"Along the {axis} axis of the world") for axis in profiles.AXES],
+        **profiles.PROFILE["axis"].keywords,
     )
 
     def ends(self, obj):
@@ -50,43 +45,25 @@ class Profile(Tool):
     def plan(self, context, obj):
         ends = self.ends(obj)
         given = _values(obj, self.source) if self.source else None
-        reading, operator = operator_reader(context, obj)
-        across, source = _AXES.index(self.axis), self.source
-        base, place = self.origin(obj)[across], place_of(obj)
+        _, operator = operator_reader(context, obj)
+        own = SimpleNamespace(source=self.source, axis=self.axis)
+        base, place = self.origin(obj), place_of(obj)
 
         def compute(progress):
             laplacian = operator(progress)
-            path = path_between(laplacian, ends, progress)
-            heights = reading.points[:, across]
-            columns = [heights] if given is None else [heights, given]
-            found = core.profile(laplacian, path, np.column_stack(columns))
-            values, off = found.values[:, -1], found.uncertainty
-            if given is None:
-                values = base + path[:, across]  # on the surface, as between its points
-            if np.isfinite(values).sum() < 2:
-                raise PointCloudError(f'"{source}" has no values along the path. Select other points.')
-            rows = [found.distance, *(path + place).T, base + path[:, across], off[:, 0]]
-            return found.distance, values, off[:, -1], rows if given is None else [*rows, values, off[:, 1]]
+            path = profiles.path_between(laplacian, ends, cache, progress)
+            return profiles.measured(laplacian, path, given, own, base, place)
 
         return compute
 
     def write(self, context, obj, result):
-        distance, values, off, rows = result
-        self.table = _table(rows, self.source)
-        made = plot(obj, f"{obj.name} Profile", distance, values)
+        self.table = profiles.table(result.columns, self.source)
+        made = plot(obj, f"{obj.name} Profile", result.distance, result.values)
         text = bpy.data.texts.new(f"{made.name}.csv")
         text.from_string(self.table)
         obj.meshfree.profile = text
-        missing = np.count_nonzero(~np.isfinite(values))
-        notices = []
-        if missing:
-            notices.append(f"{obj.name}: {missing:,} of {len(values):,} places of the path have no value.")
-        name = self.source or f"height along {self.axis}"
-        line = (
-            f"{made.name}: {length_text(distance[-1])} long, {name} from {np.nanmin(values):.4g} to"
-            f" {np.nanmax(values):.4g}, +- {np.sqrt(np.nanmean(off**2)):.2g}. The table is the text {text.name}"
-        )
-        return [*notices, line]
+        line = profiles.profile_line(result, self, made.name, length_text)
+        return [*profiles.missing(result, obj.name), f"{line}. The table is the text {text.name}"]
 
 
 class MESHFREE_OT_profile(Profile, SelectionOperator, bpy.types.Operator):
@@ -116,23 +93,8 @@ def _values(obj, name):
     if name not in obj.data.attributes:
         raise PointCloudError(f'"{obj.name}" has no attribute "{name}". Choose one of its attributes.')
     layer = obj.data.attributes[name]
-    if layer.domain != "POINT" or layer.data_type != "FLOAT":
-        raise PointCloudError(
-            f'The attribute "{name}" of "{obj.name}" is not one number at each point that changes along the surface.'
-            " Choose another one."
-        )
+    profiles.check_varying(layer.domain == "POINT" and layer.data_type == "FLOAT", name, f'"{obj.name}"')
     return read_attribute(obj.data, name)
-
-
-def _table(columns, source):
-    """Return a table as text with commas: of heights alone, or with an attribute."""
-    names = ["distance", "x", "y", "z", "height", "height_uncertainty"]
-    if source:
-        names += [source, f"{source}_uncertainty"]
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerow(names)
-    np.savetxt(text, np.column_stack(columns), "%.12g", ",")
-    return text.getvalue()
 
 
 TOOLS = (

@@ -1,19 +1,15 @@
 """Cross sections of the surface by a plane, as curve objects."""
 
 import bpy
-import numpy as np
 from bpy.props import FloatProperty, StringProperty
 
-from ... import core
-from ...core import PointCloudError
+from ...command import sections
 from ..objects.curves import add_curves
 from ..objects.planes import plane_of
 from ..objects.result import area_text, length_text
 from ..registration import Registration, Row
 from ..running.application import ApplicationOperator, Tool, operator_reader
 from .mesh import bare_mesh
-
-_UP = np.array([0.0, 0.0, 1.0])
 
 
 class CrossSection(Tool):
@@ -44,11 +40,7 @@ class CrossSection(Tool):
         def compute(progress):
             laplacian = operator(progress)
             mesh = bare_mesh(laplacian, 1.0, progress)
-            found = core.cross_section(laplacian, place, normal, mesh=mesh, progress=progress)
-            if not found.curves:
-                raise PointCloudError(
-                    f'The plane passes beside the surface of "{name}", or only touches it. Move it to where it cuts.'
-                )
+            found = sections.cut(laplacian, place, normal, mesh, name, progress)
             lines = [(reading.local(curve.points), curve.closed) for curve in found.curves]
             return found, lines, guessed
 
@@ -57,19 +49,14 @@ class CrossSection(Tool):
     def cut(self, context, obj, reading):
         """Return a point and a normal of the plane, as points are read, and a notice of what was guessed or ""."""
         if not self.plane:
-            middle = 0.5 * (reading.points.min(axis=0) + reading.points.max(axis=0))
-            return middle, _UP, f"{obj.name} is cut by the horizontal plane through its middle: no Plane is chosen."
+            guessed = f"{obj.name} is cut by the horizontal plane through its middle: no Plane is chosen."
+            return sections.middle(reading.points), sections.UP, guessed
         return *plane_of(context.scene, self.plane, obj), ""
 
     def write(self, context, obj, result):
         self.found, lines, guessed = result
         made = add_curves(obj, f"{obj.name} Section", lines, self.thickness)
-        count = len(lines)
-        curves = "1 curve" if count == 1 else f"{count:,} curves"
-        line = (
-            f"{made.name}: {curves}, {length_text(self.found.length)} long, enclosed area"
-            f" {area_text(self.found.enclosed_area)}"
-        )
+        line = sections.section_line(self.found, made.name, length_text, area_text)
         return [*filter(None, [guessed]), *self.found.notices, line]
 
 

@@ -4,8 +4,8 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, IntProperty
 
-from ... import core
-from ...command.quantities import HEAT_SIGNATURE, SEGMENT, WAVE_SIGNATURE
+from ...command import segmenting
+from ...command.quantities import SEGMENT
 from ...core import PointCloudError
 from ..objects.attributes import read_attribute, remove_numbered, tag_changed, write_attribute
 from ..objects.deleting import keep_points
@@ -13,7 +13,6 @@ from ..objects.result import EIGENVALUES, check_writable
 from ..registration import Registration, Row
 from ..running import cache
 from ..running.application import ApplicationOperator, ShownOperator, Tool, operator_reader
-from .analyze import resolved_modes
 
 GROUP = "Segment {}"  # of vertex groups and objects
 
@@ -26,17 +25,14 @@ class Segment(Tool):
 
     method: EnumProperty(
         name="Method",
-        description="What makes a part",
         items=[
             ("PARTS", "Parts", "As many connected parts as requested, divided where the shape is narrow"),
             ("NODAL", "Signs of a Mode", "Connected regions in which a vibration mode keeps its sign"),
         ],
-        default="PARTS",
+        **segmenting.SEGMENT["method"].keywords,
     )
-    parts: IntProperty(name="Parts", description="How many parts", default=6, min=1, soft_max=50)
-    mode: IntProperty(
-        name="Mode", description="Number of the mode; 1 is the constant one", default=2, min=1, soft_max=100
-    )
+    parts: IntProperty(name="Parts", soft_max=50, **segmenting.SEGMENT["parts"].keywords)
+    mode: IntProperty(name="Mode", soft_max=100, **segmenting.SEGMENT["mode"].keywords)
     vertex_groups: BoolProperty(
         name="Vertex Groups",
         description="Make a vertex group of each part; of point clouds an attribute",
@@ -52,23 +48,15 @@ class Segment(Tool):
         if self.vertex_groups and obj.type == "MESH":
             _check_groups(obj)
         _, operator = operator_reader(context, obj)
-        by_mode, parts, mode = self.method == "NODAL", self.parts, self.mode
-
-        def compute(progress):
-            laplacian = operator(progress)
-            if by_mode:
-                return cache.result(laplacian, "nodal", mode, compute=lambda: _by_mode(laplacian, mode, progress))
-            return cache.result(laplacian, "parts", parts, compute=lambda: _by_shape(laplacian, parts, progress))
-
-        return compute
+        given = self.method, self.parts, self.mode
+        return lambda progress: segmenting.segmented(operator(progress), *given, cache, progress)
 
     def write(self, context, obj, result):
         write_attribute(obj.data, SEGMENT, result)
-        count = int(result.max()) + 1
         if self.vertex_groups:
-            _write_groups(obj, [result == label for label in range(count)])
+            _write_groups(obj, [result == label for label in range(int(result.max()) + 1)])
         tag_changed(obj.data)
-        return [f"{obj.name}: {count} part{'s' if count > 1 else ''}"]
+        return [segmenting.parts_line(result, obj.name)]
 
 
 class MESHFREE_OT_segment(Segment, ShownOperator, bpy.types.Operator):
@@ -76,21 +64,6 @@ class MESHFREE_OT_segment(Segment, ShownOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.segment"
     bl_label = "Segment"
-
-
-def _by_mode(laplacian, mode, progress):
-    """Divide the points by the signs of a mode."""
-    vector = cache.lowest_modes(laplacian, mode, progress).eigenvectors[:, mode - 1]
-    progress("Regions", 0.5)
-    return core.nodal_domains(vector, laplacian)
-
-
-def _by_shape(laplacian, parts, progress):
-    """Divide the points into parts, by kept modes if there are enough."""
-    count, spectrum = core.modes_needed(laplacian, parts), None
-    if cache.known_modes(laplacian) >= count:
-        spectrum = resolved_modes(laplacian, count, progress)[0]
-    return core.segment(laplacian, parts, spectrum=spectrum, progress=progress)
 
 
 def _is_numbered(name):
@@ -173,40 +146,31 @@ class Signature(Tool):
 
     kind: EnumProperty(
         name="Kind",
-        description="What spreads over the surface",
         items=[
             ("HEAT", "Heat", "Heat that is left after some time: high on tips and thin parts"),
             ("WAVE", "Wave", "Waves of one energy: sharper, also for small features"),
         ],
-        default="HEAT",
+        **segmenting.SIGNATURE["kind"].keywords,
     )
-    count: IntProperty(
-        name="Scales", description="How many scales, from fine to coarse", default=8, min=1, soft_max=50, max=999
-    )
-    modes: IntProperty(
-        name="Modes", description="How many vibration modes they are made of", default=100, min=10, soft_max=300
-    )
+    count: IntProperty(name="Scales", soft_max=50, **segmenting.SIGNATURE["count"].keywords)
+    modes: IntProperty(name="Modes", soft_max=300, **segmenting.SIGNATURE["modes"].keywords)
 
     @property
     def writes(self):
         """Names of the attributes."""
-        return [f"{self._prefix()}{number:03d}" for number in range(1, self.count + 1)]
-
-    def _prefix(self):
-        return HEAT_SIGNATURE if self.kind == "HEAT" else WAVE_SIGNATURE
+        return segmenting.signature_names(self.kind, self.count)
 
     def plan(self, context, obj):
         _, operator = operator_reader(context, obj)
-        signature = core.heat_kernel_signature if self.kind == "HEAT" else core.wave_kernel_signature
-        count, modes = self.count, self.modes
-        return lambda progress: signature(cache.lowest_modes(operator(progress), modes, progress), count=count)
+        given = self.kind, self.count, self.modes
+        return lambda progress: segmenting.signatures(operator(progress), *given, cache, progress)
 
     def write(self, context, obj, result):
-        remove_numbered(obj.data, self._prefix(), beyond=self.count)
+        remove_numbered(obj.data, segmenting.signature_prefix(self.kind), beyond=self.count)
         for name, values in zip(self.writes, result.T, strict=True):
             write_attribute(obj.data, name, values)
         tag_changed(obj.data)
-        return [f"{obj.name}: signatures at {self.count} scales"]
+        return [segmenting.signature_line(self.count, obj.name)]
 
 
 class MESHFREE_OT_signature(Signature, ShownOperator, bpy.types.Operator):

@@ -9,6 +9,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 from bpy_extras import view3d_utils
 
 from ... import core
+from ...command.groups import HANDLE, SOURCE
 from ...core import PointCloudError
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import (
@@ -21,8 +22,6 @@ from ..objects.attributes import (
 )
 from ..objects.counting import renew_counts
 from ..objects.groups import (
-    HANDLE,
-    SOURCE,
     assign,
     check_assignable,
     chosen_members,
@@ -149,12 +148,6 @@ def selected(obj):
     if not chosen.any():
         raise PointCloudError(f'No points of "{obj.name}" are selected. Select some in Edit Mode.')
     return chosen
-
-
-def unreached(obj, reached, consequence: str) -> list:
-    """Return a notice of the points of an object that no source reaches, given those that one does, (n,) bool."""
-    missed = np.count_nonzero(~reached)
-    return [f"{missed:,} points of {obj.name} are reached by no source. {consequence}"] if missed else []
 
 
 def read_sources(obj, group):

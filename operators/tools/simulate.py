@@ -8,21 +8,22 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
 
+from ...command import simulation
+from ...command.groups import unreached
+from ...command.motions import Chosen, InModes, find_touched, in_modes
 from ...command.quantities import MOTION, NORMAL
 from ...core import PointCloudError
 from ..objects import motion_files
-from ..objects.groups import SOURCE
 from ..objects.motion import show_frame, show_values, write_frames
 from ..objects.motion_nodes import forget_groups, mode_name, show_motion
 from ..objects.result import length_text
 from ..objects.touching import places_of
 from ..registration import Registration, Row
+from ..running import cache
 from ..running.application import ShownOperator, Tool, operator_reader
-from ..running.motions import SPOT, Chosen, InModes, find_touched, frame_rows, in_modes
-from .select import read_sources, unreached
+from .select import read_sources
 
 FOLDER = "//motion"  # beside the file
-_DEAD = 0.05  # highest concentration where a reaction has ended
 _IN_MODES = ("HEAT", "WAVE")
 _BLURRED = 0.99  # share of a pulse that the modes should hold
 _MEGABYTE = 1 << 20
@@ -67,20 +68,15 @@ class Simulate(Tool):
 
     kind: EnumProperty(
         name="Motion",
-        description="What moves along the surface",
         items=[
             ("HEAT", "Heat", "Spreads from the sources and becomes even"),
             ("WAVE", "Wave", "A pulse at the sources, which runs in all directions and is reflected at boundaries"),
             ("REACTION", "Reaction", "Two substances that react and spread: patterns of spots or stripes"),
             ("FRONT", "Front", "Travels from the sources at one speed, as fire does"),
         ],
-        default="HEAT",
+        **simulation.SIMULATE["kind"].keywords,
     )
-    group: StringProperty(
-        name="Sources",
-        description="Vertex group of the sources; where there is none of that name, the points selected in Edit Mode",
-        default=SOURCE,
-    )
+    group: StringProperty(name="Sources", **simulation.SIMULATE["group"].keywords)
     toucher: StringProperty(
         name="Touching Object",
         description="Object of the scene that starts the motion at each frame where its vertices touch the points, in"
@@ -88,37 +84,15 @@ class Simulate(Tool):
     )
     pattern: EnumProperty(
         name="Pattern",
-        description="What the reaction makes",
         items=[
             ("SPOTS", "Spots", "Spots that divide until they cover the surface"),
             ("STRIPES", "Stripes", "Winding stripes"),
         ],
-        default="SPOTS",
+        **simulation.SIMULATE["pattern"].keywords,
     )
-    distance: FloatProperty(
-        name="Distance",
-        description="How far heat spreads, or a wave or front travels, within all frames; for patterns, from one spot"
-        " or stripe to the next. 0 for a distance that fits the object",
-        default=0.0,
-        min=0.0,
-        subtype="DISTANCE",
-    )
-    width: FloatProperty(
-        name="Width",
-        description="Width of the pulse from which heat or a wave starts, or of the edge of a front; 0 for as narrow as"
-        " the points resolve",
-        default=0.0,
-        min=0.0,
-        subtype="DISTANCE",
-    )
-    frames: IntProperty(
-        name="Frames",
-        description="How many frames, from the first frame of the scene on; 0 for all of the scene",
-        default=0,
-        min=0,
-        soft_max=1000,
-        max=10000,
-    )
+    distance: FloatProperty(name="Distance", subtype="DISTANCE", **simulation.SIMULATE["distance"].keywords)
+    width: FloatProperty(name="Width", subtype="DISTANCE", **simulation.SIMULATE["width"].keywords)
+    frames: IntProperty(name="Frames", soft_max=1000, **simulation.SIMULATE["frames"].keywords)
     keep: EnumProperty(
         name="Kept",
         description="How the motion is kept",
@@ -194,13 +168,12 @@ class Simulate(Tool):
 
         def compute(progress):
             laplacian = operator(progress)
-            motion_of = find_touched(laplacian, chosen) if touches else chosen
+            motion_of = find_touched(laplacian, chosen, length_text) if touches else chosen
             if modes:
-                motion = in_modes(laplacian, motion_of, modes, progress)
+                motion = in_modes(laplacian, motion_of, modes, cache, progress)
             else:
                 motion = _on_disk(path, laplacian, motion_of, progress)
-            component = laplacian.component
-            reached = np.isin(component, component[motion_of.sources]) & (component >= 0)
+            reached = simulation.reached(laplacian, motion_of.sources)
             return Simulated(motion, count, step, reached, reading.local_normals(laplacian.normals))
 
         return compute
@@ -230,13 +203,8 @@ class Simulate(Tool):
 
     def about(self, obj, result) -> list:
         """Return notices about what was simulated."""
-        notices = unreached(obj, result.reached, "Nothing moves there.")
-        if self.kind == "REACTION" and result.motion.last < _DEAD:
-            notices.append(
-                f"The reaction has died out. Patterns need a Distance of {SPOT:g} smoothing lengths of the points or"
-                " more, and sources that are single points or small groups."
-            )
-        return notices
+        notices = unreached(result.reached, obj.name, "Nothing moves there.")
+        return [*notices, *simulation.dead(self.kind, result.motion.last)]
 
     def _about_kept(self, result):
         motion, notices = result.motion, []
@@ -259,19 +227,12 @@ class Simulate(Tool):
         return notices
 
     def _line(self, obj, result):
-        done = {
-            "HEAT": "heat spreads by",
-            "WAVE": "waves run",
-            "REACTION": f"{self.pattern.lower()} at a distance of",
-            "FRONT": "the front travels",
-        }[self.kind]
         motion = result.motion
         if isinstance(motion, InModes):
             size = f"{len(motion.formula.rates)} modes"
         else:
             size = f"{motion.path.stat().st_size / _MEGABYTE:.1f} MB"
-        span = f"values {motion.low:.3g} to {motion.high:.3g}"
-        return f"{obj.name}: {done} {length_text(motion.distance)}, {span}, {size}"
+        return f"{simulation.motion_line(self.kind, self.pattern, motion, obj.name, length_text)}, {size}"
 
 
 def _as_modes(tool) -> bool:
@@ -281,19 +242,9 @@ def _as_modes(tool) -> bool:
 
 def _on_disk(path, laplacian, chosen, progress) -> _Frames:
     """Simulate, and write the frames to a file."""
-    rows, distance = frame_rows(laplacian, chosen, progress)
-    seen = []
-
-    def watched():
-        for number, row in enumerate(rows):
-            progress("Frames", min(number / chosen.kept, 1.0))
-            seen.append((row.min(), row.max()))
-            yield row
-
-    write_frames(path, chosen.kept, len(chosen.sources), watched())
-    low, high = np.min(seen, axis=0)[0], np.max(seen, axis=0)[1]
-    last = {"WAVE": np.abs(seen[len(seen) // 2 :]).max(), "REACTION": seen[-1][1]}.get(chosen.kind, high)
-    return _Frames(path, low, high, last, distance)
+    seen = simulation.Watched(laplacian, chosen, cache, progress)
+    write_frames(path, chosen.kept, len(chosen.sources), seen)
+    return _Frames(path, seen.low, seen.high, seen.last, seen.distance)
 
 
 def _lock_range(settings, kind, motion):

@@ -1,11 +1,12 @@
 """Spectral smoothing and enhancement of shapes, and deformation by a vibration mode."""
 
+from types import SimpleNamespace
+
 import bpy
-import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ... import core
-from ...command.results import check_wavelength
+from ...command import smoothing
 from ...core import PointCloudError
 from ..objects.animation import curves
 from ..objects.carried import carries
@@ -18,9 +19,7 @@ from ..running import cache
 from ..running.application import ApplicationOperator, Tool, operator_reader
 from ..running.discs import disc_finder
 
-_HEAT, _DETAIL = 9.0, 18.0  # default wavelengths in smoothing lengths: those of details of some points
 _READY = 20  # modes computed at least, so that Adjust Last Operation can step through them
-_FINEST = 8.0  # details finer than the wavelength by this factor count as noise, which is not amplified
 
 
 class Smooth(Tool):
@@ -30,7 +29,6 @@ class Smooth(Tool):
 
     method: EnumProperty(
         name="Method",
-        description="What is smoothed, and how",
         items=[
             ("EDGES", "Keep Edges", "Remove noise along the normals, and keep edges"),
             ("NOISE", "Remove Noise", "Remove the noise of single points and keep the shape, by frequency"),
@@ -38,42 +36,23 @@ class Smooth(Tool):
             ("MODES", "Keep Modes", "Project the shape onto the lowest vibration modes"),
             ("DETAIL", "Scale Details", "Make details stronger or weaker and keep the coarse shape"),
         ],
-        default="EDGES",
+        **smoothing.SMOOTH["method"].keywords,
     )
-    wavelength: FloatProperty(
-        name="Wavelength",
-        description="Wavelength that is halved, or the longest one that is scaled; 0 for a default suited to the"
-        " points",
-        default=0.0,
-        min=0.0,
-        subtype="DISTANCE",
-    )
-    modes: IntProperty(
-        name="Modes", description="How many modes are kept, the constant one included", default=100, min=4, soft_max=500
-    )
-    gain: FloatProperty(name="Gain", description="How much stronger details become", default=1.5, min=0.0, soft_max=3.0)
-    strength: FloatProperty(
-        name="Strength",
-        description="Factor of the displacements to the smooth positions",
-        default=1.0,
-        min=0.0,
-        max=1.0,
-        subtype="FACTOR",
-    )
-    group: StringProperty(
-        name="Vertex Group", description="Smooth the points of this group only, by their weights; empty for all points"
-    )
+    wavelength: FloatProperty(name="Wavelength", subtype="DISTANCE", **smoothing.SMOOTH["wavelength"].keywords)
+    modes: IntProperty(name="Modes", soft_max=500, **smoothing.SMOOTH["modes"].keywords)
+    gain: FloatProperty(name="Gain", soft_max=3.0, **smoothing.SMOOTH["gain"].keywords)
+    strength: FloatProperty(name="Strength", subtype="FACTOR", **smoothing.SMOOTH["strength"].keywords)
+    group: StringProperty(name="Vertex Group", **smoothing.SMOOTH["group"].keywords)
     keep: EnumProperty(
         name="Keep",
-        description="Scale the result so that it keeps its size",
         items=[
             ("NONE", "Nothing", "Let the shape shrink"),
             ("AREA", "Area", "Keep the area of each component"),
             ("VOLUME", "Volume", "Keep the volume of each component; for closed surfaces"),
         ],
-        default="NONE",
+        **smoothing.SMOOTH["keep"].keywords,
     )
-    keep_boundary: BoolProperty(name="Keep Boundary", description="Leave the boundary where it is", default=True)
+    keep_boundary: BoolProperty(name="Keep Boundary", **smoothing.SMOOTH["keep_boundary"].keywords)
     target: target_property()
 
     @property
@@ -91,60 +70,22 @@ class Smooth(Tool):
         check_movable(obj, self.target)
         reading, operator = operator_reader(context, obj)
         mask = chosen_weights(obj, self.group, "Vertex Group") if self.group else None
-        method, modes, gain, wavelength = self.method, self.modes, self.gain, self.wavelength
-        shared = {"strength": self.strength, "mask": mask, "keep": self.keep.lower() if self.keep != "NONE" else None}
-        keep_boundary, name, splats = self.keep_boundary, obj.name, has_splats(obj.data)
+        own = SimpleNamespace(**{name: getattr(self, name) for name in smoothing.SMOOTH})
+        name, splats = obj.name, has_splats(obj.data)
         find_discs = disc_finder(obj, reading)
 
         def compute(progress):
             laplacian = operator(progress)
-            points, full = smoothed(laplacian, progress)
+            points, full = smoothing.smoothed(laplacian, own, mask, name, cache, progress)
             gradients = core.deformation_gradients(laplacian, points) if splats else None
             return reading, points, gradients, find_discs(full, points)
-
-        def smoothed(laplacian, progress):
-            """Return the points, and those at full strength."""
-            dirichlet = keep_boundary and bool(laplacian.boundary.any())
-            if dirichlet and shared["keep"]:
-                raise PointCloudError(
-                    f'"{name}" has a boundary, which determines the size already. Set Keep to Nothing, or turn off'
-                    " Keep Boundary."
-                )
-            check_wavelength(wavelength, reading.points, name)
-            blend = core.PointBlend(laplacian, dirichlet=dirichlet, **shared)
-            settings = (
-                method,
-                dirichlet,
-                modes if method == "MODES" else wavelength,
-                gain if method == "DETAIL" else 0,
-            )
-
-            def filtered():
-                return cache.result(
-                    laplacian,
-                    "smooth",
-                    *settings,
-                    compute=lambda: _smooth(laplacian, method, dirichlet, modes, wavelength, gain, progress),
-                )
-
-            if not shared["keep"]:
-                return blend(filtered()), filtered()
-
-            def scaled():
-                places = filtered()
-                progress("Size", 0.9)
-                return blend(places)
-
-            return cache.result(laplacian, "scaled", *settings, *shared.values(), compute=scaled), filtered()
 
         return compute
 
     def write(self, context, obj, result):
         reading, points, gradients, discs = result
         write_positions(obj, reading, points, self.target, "Smooth", gradients, discs)
-        moved = np.linalg.norm(points - reading.points, axis=1)
-        average, most = length_text(np.sqrt(np.mean(moved**2))), length_text(moved.max())
-        return [f"{obj.name}: {len(points):,} points moved by {average} on average, at most by {most}"]
+        return [smoothing.smooth_line(reading.points, points, obj.name, length_text)]
 
 
 class MESHFREE_OT_smooth(Smooth, ApplicationOperator, bpy.types.Operator):
@@ -155,52 +96,15 @@ class MESHFREE_OT_smooth(Smooth, ApplicationOperator, bpy.types.Operator):
     keeps_line = True
 
 
-def _smooth(laplacian, method, dirichlet, modes, wavelength, gain, progress):
-    """Return the points, (n, 3), by a method at full strength."""
-    if method == "EDGES":
-        return core.clean_points(laplacian, dirichlet=dirichlet, progress=progress)
-    base = cache.result(
-        laplacian,
-        "base",
-        dirichlet,
-        compute=lambda: core.smoothing_base(laplacian, dirichlet=dirichlet, progress=progress),
-    )
-    settings = {"dirichlet": dirichlet, "progress": progress, "base": base}
-    length = np.median(laplacian.smoothing_lengths)
-    if method == "NOISE":
-        return core.fair_points(laplacian, (wavelength / (2.0 * np.pi)) ** 2 if wavelength else None, **settings)
-    if method == "MODES":
-        spectrum = cache.lowest_modes(laplacian, modes, progress, dirichlet, raw=True)
-        return core.smooth_points(laplacian, modes, spectrum, **settings)
-    if method == "HEAT":
-        squared = ((wavelength or _HEAT * length) / (2.0 * np.pi)) ** 2
-        return core.smooth_points(laplacian, core.exponential(np.log(2.0) * squared), **settings)
-    low = (2.0 * np.pi / (wavelength or _DETAIL * length)) ** 2
-    return core.smooth_points(laplacian, core.boost(gain, low, _FINEST**2 * low), **settings)
-
-
 class ModeShape(Tool):
     """The settings and the work of `meshfree.mode_shape`."""
 
     adjustable = ("mode", "amplitude", "phase", "animate", "period", "target")
     at_zero = {"amplitude": "Automatic"}
 
-    mode: IntProperty(
-        name="Mode", description="Number of the mode; 1 is the constant one", default=2, min=1, soft_max=100
-    )
-    amplitude: FloatProperty(
-        name="Amplitude",
-        description="Largest displacement; 0 for a tenth of the object's radius",
-        default=0.0,
-        min=0.0,
-        subtype="DISTANCE",
-    )
-    phase: FloatProperty(
-        name="Phase",
-        description="Angle of the vibration: 0 is full displacement, 180 degrees the opposite one",
-        default=0.0,
-        subtype="ANGLE",
-    )
+    mode: IntProperty(name="Mode", soft_max=100, **smoothing.MODE_SHAPE["mode"].keywords)
+    amplitude: FloatProperty(name="Amplitude", subtype="DISTANCE", **smoothing.MODE_SHAPE["amplitude"].keywords)
+    phase: FloatProperty(name="Phase", subtype="ANGLE", **smoothing.MODE_SHAPE["phase"].keywords)
     animate: BoolProperty(
         name="Animate", description="Keyframe the shape key as a vibration over the frames of the scene", default=False
     )
@@ -221,7 +125,7 @@ class ModeShape(Tool):
             )
         check_movable(obj, target)
         reading, operator = operator_reader(context, obj)
-        mode, amplitude, phase = self.mode, self.amplitude or None, self.phase
+        mode, amplitude, phase = self.mode, self.amplitude, self.phase
         repeated, carried = self.is_repeated(context), carries(obj) and not self.animate
 
         def compute(progress):
@@ -232,8 +136,7 @@ class ModeShape(Tool):
             else:
                 several = max(mode, min(_READY, len(reading.points) // 3))
                 cache.lowest_modes(laplacian, several, progress, raw=True)
-            vector = cache.lowest_modes(laplacian, number, progress).eigenvectors[:, number - 1]
-            points = core.displace_by_mode(laplacian, vector, amplitude, phase=phase)
+            points = smoothing.by_mode(laplacian, number, amplitude, phase, cache, progress)
             return reading, points, number, core.deformation_gradients(laplacian, points) if carried else None
 
         return compute
@@ -249,9 +152,8 @@ class ModeShape(Tool):
                 key.value = (1.0, 0.0, -1.0, 0.0)[index % 4]
                 key.keyframe_insert("value", frame=scene.frame_start + index * quarter)
             key.value = _animated_value(key, scene.frame_current_final)  # else unchanged until the next frame
-        largest = np.linalg.norm(points - reading.points, axis=1).max()
         again = f"Only {mode} modes are computed: this is the last. Start Deform by Mode again for more."
-        line = f"{obj.name}: moved by mode {mode}, at most by {length_text(largest)}"
+        line = smoothing.mode_line(reading.points, points, mode, obj.name, length_text)
         return [again, line] if mode < self.mode else [line]
 
 

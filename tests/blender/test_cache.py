@@ -168,7 +168,7 @@ def test_a_field_between_other_values_is_solved_once(cache, calls, core):
 
 @pytest.mark.any_blender
 def test_a_film_that_was_stopped_is_not_kept(cache, core):
-    minimal = part("operators.tools.minimal")
+    minimal = part("command.minimal")
     points = wave()
     boundary = core.build_laplacian(points).boundary
 
@@ -177,7 +177,7 @@ def test_a_film_that_was_stopped_is_not_kept(cache, core):
             raise core.Cancelled
 
     with pytest.raises(core.Cancelled):
-        minimal._shrink(points, boundary, 0.0, 4, options(), stop_later)
+        minimal.shrink(points, boundary, 0.0, 4, options(), stop_later)
 
 
 def test_modes_of_another_boundary_are_others(cache):

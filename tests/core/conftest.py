@@ -1,6 +1,7 @@
-"""Operators of large clouds, built once for all tests of the core."""
+"""Operators of large clouds, built once for all tests of the core, and the command line."""
 
 import functools
+import json
 
 import pytest
 
@@ -17,6 +18,8 @@ from benchmarks.samplings import (
     torus_points,
     uneven_sphere,
 )
+from command import verbs
+from command.main import run as run_command
 
 CLOUDS = {
     "even sphere": lambda: fibonacci_sphere(2500),
@@ -62,3 +65,14 @@ def bar(operators):
     """A capsule along an axis, with its operator."""
     laplacian = operators("capsule")
     return laplacian.points, laplacian
+
+
+@pytest.fixture
+def run(capsys):
+    """Run the command line; return the exit code and the JSON lines."""
+
+    def run(*arguments):
+        code = run_command([str(argument) for argument in arguments], verbs.make_verbs(), "meshfree")
+        return code, [json.loads(line) for line in capsys.readouterr().out.splitlines() if line.startswith("{")]
+
+    return run

@@ -1,6 +1,5 @@
 """The command line without Blender: verbs on clouds of files, by the function that the program calls."""
 
-import json
 import subprocess
 import sys
 from pathlib import Path
@@ -19,17 +18,6 @@ from core.files import PointTable, read_points, write_points
 
 FAR = np.array([400_000.0, 5_000_000.0, 100.0])
 SPHERE = fibonacci_sphere(800)
-
-
-@pytest.fixture
-def run(capsys):
-    """Run the command line; return the exit code and the JSON lines."""
-
-    def run(*arguments):
-        code = run_command([str(argument) for argument in arguments], verbs.make_verbs(), "meshfree")
-        return code, [json.loads(line) for line in capsys.readouterr().out.splitlines() if line.startswith("{")]
-
-    return run
 
 
 def write(path, points, **columns):

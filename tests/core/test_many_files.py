@@ -17,17 +17,6 @@ POINTS = fibonacci_sphere(200)
 
 
 @pytest.fixture
-def run(capsys):
-    """Run the command line; return the exit code and the JSON lines."""
-
-    def run(*arguments):
-        code = run_command([str(argument) for argument in arguments], verbs.make_verbs(), "meshfree")
-        return code, [json.loads(line) for line in capsys.readouterr().out.splitlines() if line.startswith("{")]
-
-    return run
-
-
-@pytest.fixture
 def folder(tmp_path):
     """A folder with eight clouds of a delivery, one of them broken."""
     (tmp_path / "in").mkdir()

@@ -5,10 +5,10 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from ...command.quantities import quantity
-from ...core import PointCloudError
-from ..objects.ticks import round_ticks, tick_texts
-from ..objects.units import attribute_power, unit
+from . import core
+from .quantities import quantity
+from .ticks import round_ticks, tick_texts
+from .units import attribute_power, unit
 
 _SIZE = 640, 280  # in pixels
 _LEFT, _RIGHT, _TOP, _BOTTOM = 76, 16, 14, 46  # margins
@@ -24,7 +24,7 @@ def profile_picture(table: str, settings) -> str:
     table : str
         As the tool writes it.
     settings : bpy.types.UnitSettings
-        Of the scene.
+        Of the scene; or `NO_UNITS`.
 
     Returns
     -------
@@ -42,7 +42,7 @@ def profile_picture(table: str, settings) -> str:
         columns = np.loadtxt(lines[1:], delimiter=",", ndmin=2).T
         across, values, doubts = columns[0], columns[-2], columns[-1]
     except (ValueError, IndexError) as error:
-        raise PointCloudError(
+        raise core.PointCloudError(
             f"The table of the profile is not as it was written: {error}. Press Profile again."
         ) from error
     name = names[-2]

@@ -5,11 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ... import core
-from ...core import PointCloudError
-from ..objects.motion_nodes import Formula
-from ..objects.result import length_text
-from . import cache
+from . import core
 
 SPOT = 10.0  # smoothing lengths in the size of a pattern: finer ones are not resolved, and die out
 _WIDTH = 6.0  # smoothing lengths: a pulse that the points resolve
@@ -20,6 +16,45 @@ _LONGEST = 5.0  # of these, in one step of a reaction
 _EDGE = math.exp(-1.0)  # of a pulse, at its width
 _FAR = 6.0  # widths from which a pulse is nothing
 _FADED = 0.4  # height of a wave that has left its pulse, over that
+
+
+class Formula(NamedTuple):
+    """A motion as a sum of modes, with the time from 0 at the first frame of the scene to 1 at the last.
+
+    Each start adds to the amplitude of a mode its share times a function of the time since then.
+
+    Attributes
+    ----------
+    function : {"COSINE", "EXPONENT"}
+        Of nodes: ``cos(rate * time)``, or ``exp(rate * time)``.
+    rates : ndarray, (k,)
+    modes : ndarray, (n, k)
+    starts : ndarray, (j,)
+        Times, ascending.
+    shares : ndarray, (j, k)
+    """
+
+    function: str
+    rates: np.ndarray
+    modes: np.ndarray
+    starts: np.ndarray
+    shares: np.ndarray
+
+    @property
+    def is_single(self) -> bool:
+        """Whether all starts at the time zero, so that nodes need no more than the function."""
+        return len(self.starts) == 1 and self.starts[0] == 0.0
+
+    def amplitudes(self, time: float):
+        """Return the amplitudes of the modes at a time, (k,)."""
+        begun = self.starts <= max(time, 0.0)
+        since = max(time, 0.0) - self.starts[begun]
+        function = {"COSINE": np.cos, "EXPONENT": np.exp}[self.function]
+        return np.sum(self.shares[begun] * function(np.multiply.outer(since, self.rates)), axis=0)
+
+    def at(self, time: float):
+        """Return the motion at a time, (n,)."""
+        return self.modes @ self.amplitudes(time)
 
 
 class Chosen(NamedTuple):
@@ -91,14 +126,14 @@ class InModes(NamedTuple):
     distance: float
 
 
-def find_touched(laplacian, chosen) -> Chosen:
+def find_touched(laplacian, chosen, length_text) -> Chosen:
     """Return the settings with the points that are touched: the nearest ones of places that are not too far off."""
     points, reach = laplacian.points, _width(laplacian, chosen)
     places = np.concatenate(chosen.places)
     rows = core.geometry.nearest_rows(points, places)
     near = (np.linalg.norm(points[rows] - places, axis=1) <= reach) & (laplacian.component[rows] >= 0)
     if not near.any():
-        raise PointCloudError(
+        raise core.PointCloudError(
             f"The Touching Object comes within {length_text(reach)} of no point in any frame. Move it nearer, or raise"
             " Width."
         )
@@ -108,8 +143,8 @@ def find_touched(laplacian, chosen) -> Chosen:
     return chosen._replace(sources=np.isin(np.arange(len(points)), rows[near]), touched=touched)
 
 
-def frame_rows(laplacian, chosen, progress):
-    """Simulate frame by frame.
+def frame_rows(laplacian, chosen, cache, progress):
+    """Simulate frame by frame; `cache` keeps results, as Blender's side does, or the module `uncached`.
 
     Returns
     -------
@@ -119,11 +154,11 @@ def frame_rows(laplacian, chosen, progress):
         How far the motion goes, or the size of a pattern.
     """
     return {"HEAT": _heat, "WAVE": _wave, "REACTION": _reaction, "FRONT": _front}[chosen.kind](
-        laplacian, chosen, progress
+        laplacian, chosen, cache, progress
     )
 
 
-def in_modes(laplacian, chosen, count, progress) -> InModes:
+def in_modes(laplacian, chosen, count, cache, progress) -> InModes:
     """Compute heat or a wave as a number of modes.
 
     Each touch drives the modes by what it adds to the motion as they hold it, projected onto them: so many numbers for
@@ -140,7 +175,7 @@ def in_modes(laplacian, chosen, count, progress) -> InModes:
     for number in range(chosen.kept if chosen.touched is not None else 1):
         progress("Frames", number / chosen.kept)
         time = number * chosen.share
-        now, pulse = formula.at(time), _pulse(laplacian, chosen, chosen.starts(number), progress)
+        now, pulse = formula.at(time), _pulse(laplacian, chosen, chosen.starts(number), cache, progress)
         if pulse is not None:
             added = (areas * (_pushed(now, pulse) - now)) @ modes
             starts, shares = np.append(formula.starts, time), np.concatenate([formula.shares, [added]])
@@ -170,7 +205,7 @@ def _width(laplacian, chosen):
     return chosen.width or _WIDTH * float(np.median(laplacian.smoothing_lengths))
 
 
-def _pulse(laplacian, chosen, rows, progress):
+def _pulse(laplacian, chosen, rows, cache, progress):
     """Return 1 at points, and less around them: one point alone would be less than the points resolve. None for none.
 
     A point that is left out of the operator starts nothing.
@@ -188,30 +223,30 @@ def _pushed(values, pulse):
     return np.maximum(values, pulse + (1.0 - pulse) * np.minimum(values, 0.0))
 
 
-def _heat(laplacian, chosen, progress):
+def _heat(laplacian, chosen, cache, progress):
     distance = _reach(laplacian, chosen)
     heat = core.Heat(laplacian, 0.25 * distance * distance * chosen.share, progress=progress)
 
     def begin(state, number):
-        pulse = _pulse(laplacian, chosen, chosen.starts(number), progress)
+        pulse = _pulse(laplacian, chosen, chosen.starts(number), cache, progress)
         return state if pulse is None else _pushed(state, pulse)
 
     return _advance(heat, np.zeros(len(laplacian.points)), begin, lambda state: state), distance
 
 
-def _wave(laplacian, chosen, progress):
+def _wave(laplacian, chosen, cache, progress):
     distance = _reach(laplacian, chosen)
     wave = core.Wave(laplacian, chosen.share, distance, progress=progress)
 
     def begin(state, number):
-        pulse = _pulse(laplacian, chosen, chosen.starts(number), progress)
+        pulse = _pulse(laplacian, chosen, chosen.starts(number), cache, progress)
         return state if pulse is None else (_pushed(state[0], pulse), state[1])
 
     nothing = np.zeros(len(laplacian.points))
     return _advance(wave, (nothing, nothing), begin, lambda state: state[0]), distance
 
 
-def _reaction(laplacian, chosen, progress):
+def _reaction(laplacian, chosen, cache, progress):
     known = laplacian.component >= 0
     resolved = SPOT * float(np.median(laplacian.smoothing_lengths[known]))
     automatic = max(resolved, math.sqrt(float(laplacian.areas[known].sum())) / _ACROSS)
@@ -222,7 +257,7 @@ def _reaction(laplacian, chosen, progress):
     chosen = chosen._replace(width=_SEED * size)  # a single point would fade before it reacts
 
     def begin(state, number):
-        pulse = _pulse(laplacian, chosen, chosen.starts(number), progress)
+        pulse = _pulse(laplacian, chosen, chosen.starts(number), cache, progress)
         if pulse is None:
             return state
         inside = pulse > _EDGE
@@ -243,7 +278,7 @@ def _advance(motion, state, begin, part, steps=1):
         number += 1
 
 
-def _front(laplacian, chosen, progress):
+def _front(laplacian, chosen, cache, progress):
     """Frames are 1 behind the front and 0 before it.
 
     A front arrives where the time of a touch and that of the way from there, together, are the least of all touches.

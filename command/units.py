@@ -1,6 +1,8 @@
 """In which unit the numbers of an attribute are written."""
 
-from ...command.quantities import quantity
+from types import SimpleNamespace
+
+from .quantities import quantity
 
 EIGENVALUE_POWER = -2
 _METERS = {
@@ -20,6 +22,7 @@ _ADAPTIVE = {
 }
 _LEFT_OPEN = ("ADAPTIVE", "METERS", "FEET")  # the latter two are defaults of new scenes
 _LEAST = {3: 0.01}  # number in an adaptive unit, if not 1, by the power
+NO_UNITS = SimpleNamespace(system="NONE")  # settings of files, whose unit is not known
 _RAISED = {1: "", 2: "²", 3: "³"}
 
 
@@ -41,7 +44,7 @@ def unit(power: int, greatest: float, settings):
         which it reaches 1, as in Blender, and of volumes the first in which it reaches a hundredth, since a cubic meter
         is a million cubic centimeters.
     settings : bpy.types.UnitSettings
-        Of the scene.
+        Of the scene; or `NO_UNITS`.
 
     Returns
     -------

@@ -1,0 +1,90 @@
+"""Verbs that move points, and splats with them."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+
+from . import clouds, core, minimal, smoothing, uncached
+from .cloud_verb import SurfaceVerb, floaters
+from .groups import is_chosen, read_weights
+from .quantities import PREFIX
+from .results import number_text
+from .settings import LAPLACIAN, chosen, default_options
+
+
+class Smooth(SurfaceVerb):
+    """The verb `smooth`."""
+
+    name = "smooth"
+    help = "smooth the shape of the points: remove noise, soften details, keep a few modes, or strengthen details"
+    settings = tuple(smoothing.SMOOTH.values())
+
+    def work(self, path, given, arguments, output, progress):
+        cloud = clouds.Cloud(path, given, floaters(arguments))
+        own = SimpleNamespace(**chosen(self.settings, arguments))
+        mask = read_weights(cloud, own.group, "--group") if own.group else None
+        laplacian = self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress).laplacian
+        points, _ = smoothing.smoothed(laplacian, own, mask, path.stem, uncached, progress)
+        written = [] if output is None else _write(output, cloud, points, laplacian)
+        line = smoothing.smooth_line(cloud.points, points, path.stem, number_text)
+        return {"points": len(points), "done": line}, [*laplacian.notices, *written]
+
+
+class ModeShape(SurfaceVerb):
+    """The verb `mode-shape`."""
+
+    name = "mode-shape"
+    help = "displace the points along their normals by a vibration mode"
+    settings = tuple(smoothing.MODE_SHAPE.values())
+
+    def work(self, path, given, arguments, output, progress):
+        cloud, own = clouds.Cloud(path, given, floaters(arguments)), chosen(self.settings, arguments)
+        laplacian = self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress).laplacian
+        points = smoothing.by_mode(laplacian, **own, cache=uncached, progress=progress)
+        written = [] if output is None else _write(output, cloud, points, laplacian)
+        line = smoothing.mode_line(cloud.points, points, own["mode"], path.stem, number_text)
+        return {"points": len(points), "done": line}, [*laplacian.notices, *written]
+
+
+class MinimalSurface(SurfaceVerb):
+    """The verb `minimal-surface`."""
+
+    name = "minimal-surface"
+    help = "move the points to the surface of least area with their boundary"
+    settings = tuple(minimal.MINIMAL.values())
+
+    def work(self, path, given, arguments, output, progress):
+        cloud, own = clouds.Cloud(path, given, floaters(arguments)), chosen(self.settings, arguments)
+        values, name = chosen(LAPLACIAN.values(), arguments), own["group"]
+        fixed, laplacian = self.boundary(cloud, values), None
+        if is_chosen(name, minimal.MINIMAL["group"].default, name in cloud.columns):
+            fixed = read_weights(cloud, name, "--group") > 0.0
+        if fixed is None or cloud.splats is not None:
+            laplacian = self.build(cloud, values, progress).laplacian
+        if fixed is None:
+            fixed = laplacian.boundary
+            minimal.check_boundary(fixed, "column", path.stem)
+        film = minimal.shrink(cloud.points, fixed, own["tolerance"], own["steps"], default_options(values), progress)
+        written = []
+        if output is not None:
+            history = {minimal.HISTORY.removeprefix(PREFIX): film.area_history}
+            written = _write(output, cloud, film.points, laplacian, history)
+        line = minimal.film_line(film, path.stem, number_text)
+        told = [] if laplacian is None else laplacian.notices
+        return {"points": len(film.points), "done": line}, [*told, *film.notices, *written]
+
+
+def _write(output, cloud, points, laplacian, arrays=None) -> list:
+    """Write a cloud whose points have moved, with further arrays to .npz files; return notices.
+
+    Splats are deformed by the gradients that their operator gives.
+    """
+    given, moved = cloud.given, points - cloud.points
+    if cloud.splats is not None:
+        after = given.deformed(given.positions + moved, core.deformation_gradients(laplacian, points))
+        places = after.positions
+    else:
+        places = given.points + moved  # so that points that stay keep all of their digits
+        after = replace(given, points=places)
+    return clouds.write(output, after, {}, {"points": np.asarray(places, dtype=np.float64), **(arrays or {})})

@@ -1,0 +1,95 @@
+"""Verbs that cut and measure along lines, whose outputs are tables."""
+
+from types import SimpleNamespace
+
+from . import clouds, profiles, sections, uncached
+from .cloud_verb import SurfaceVerb, floaters
+from .inputs import check_beside
+from .measures import check_numbers
+from .results import number_text
+from .rows import TABLES, write_rows, write_text
+from .settings import LAPLACIAN, chosen, place
+from .svg import profile_picture
+from .units import NO_UNITS
+
+
+class Section(SurfaceVerb):
+    """The verb `section`."""
+
+    name = "section"
+    help = "cut the surface by a plane: curves, with their length and the area that they enclose"
+    outputs = TABLES
+
+    def add_options(self, parser):
+        parser.add_argument(
+            "--plane",
+            type=place,
+            metavar="X,Y,Z",
+            help="position of the plane in the coordinates of the file, as --plane=X,Y,Z where X is below zero. Without"
+            " it, the middle of the points",
+        )
+        sections.add_options(parser)
+        super().add_options(parser)
+
+    def check(self, parser, arguments):
+        check_beside(parser, arguments, "curves")
+
+    def beside(self, output, arguments):
+        return [sections.corners_path(output)] if arguments.curves else []
+
+    def work(self, path, given, arguments, output, progress):
+        cloud, name = clouds.Cloud(path, given, floaters(arguments)), path.stem
+        laplacian = self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress).laplacian
+        guessed, position = [], sections.middle(cloud.points)
+        if arguments.plane is None:
+            guessed = [sections.through_middle(name)]
+        else:
+            position = arguments.plane - cloud.place
+        normal = sections.UP if arguments.normal is None else arguments.normal
+        found = sections.cut(laplacian, position, normal, None, name, progress)
+        if output is not None:
+            write_rows(output, sections.curve_records(found))
+            for corners in self.beside(output, arguments):
+                sections.write_corners(corners, found.curves, cloud.place)
+        line = sections.section_line(found, name, number_text, number_text)
+        figures = {"points": len(cloud.points), "done": line, **sections.figures(found)}
+        return figures, [*laplacian.notices, *guessed, *found.notices]
+
+
+class Profile(SurfaceVerb):
+    """The verb `profile`."""
+
+    name = "profile"
+    help = "measure the height or a column along the shortest path between two positions, as a table"
+    outputs = (".csv",)
+    settings = tuple(profiles.PROFILE.values())
+
+    def add_options(self, parser):
+        profiles.add_options(parser)
+        super().add_options(parser)
+
+    def check(self, parser, arguments):
+        check_beside(parser, arguments, "svg")
+
+    def beside(self, output, arguments):
+        return [profiles.picture_path(output)] if arguments.svg else []
+
+    def work(self, path, given, arguments, output, progress):
+        cloud, name = clouds.Cloud(path, given, floaters(arguments)), path.stem
+        own, values = SimpleNamespace(**chosen(self.settings, arguments)), None
+        if own.source:
+            values = cloud.numbers(own.source, "--source")
+            check_numbers(values, own.source, str(path))
+            profiles.check_varying(values.dtype.kind == "f", own.source, str(path))
+        ends = profiles.nearest_ends(cloud.points + cloud.place, [arguments.path_from, arguments.path_to])
+        laplacian = self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress).laplacian
+        corners = profiles.path_between(laplacian, ends.rows, uncached, progress)
+        found = profiles.measured(laplacian, corners, values, own, cloud.place, cloud.place)
+        if output is not None:
+            table = profiles.table(found.columns, own.source)
+            write_text(output, table)
+            for picture in self.beside(output, arguments):
+                write_text(picture, profile_picture(table, NO_UNITS))
+        line = profiles.profile_line(found, own, name, number_text)
+        figures = {"points": len(cloud.points), "done": line, **profiles.figures(found), **ends.figures}
+        return figures, [*laplacian.notices, *profiles.missing(found, name)]
