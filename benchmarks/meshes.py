@@ -17,6 +17,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 import core
+from core.cores import cores
 
 from .real_shapes import random_points, shapes, triangle_areas
 from .tables import Table, print_rows
@@ -77,7 +78,7 @@ def distances(points, vertices, faces):
     samples, of = random_points(vertices, faces, SAMPLES)
     samples = np.concatenate([samples, vertices[faces].mean(axis=1)])
     of = np.concatenate([of, np.arange(len(faces))])
-    near = of[cKDTree(samples).query(points, k=12, workers=-1)[1]]
+    near = of[cKDTree(samples).query(points, k=12, workers=cores())[1]]
     return np.min([_to_triangle(points, vertices[faces[column]]) for column in near.T], axis=0)
 
 

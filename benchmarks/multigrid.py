@@ -4,7 +4,6 @@ python -m benchmarks.multigrid POINTS METHOD, with a number of random points of 
 method ours, aggregation or ruge-stuben
 """
 
-import os
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -17,6 +16,7 @@ from scipy.spatial import cKDTree
 import core
 from core.algebra.hierarchy import approximate_inverse
 from core.algebra.solvers import conjugate_gradients
+from core.cores import cores
 from core.files import read_points
 
 from .samplings import random_sphere
@@ -24,7 +24,7 @@ from .samplings import random_sphere
 
 def ours(matrix, load):
     """Yield when all is ready, after the setup, and after the solution the number of steps."""
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(cores()) as pool:
         yield None
         inverse = approximate_inverse(matrix, pool, lambda: None)
         yield None

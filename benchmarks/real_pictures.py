@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 import core
+from core.cores import cores
 
 from .real_shapes import random_points, shapes
 
@@ -28,8 +29,8 @@ def area_error(vertices, faces, count=10_000):
     points, _ = random_points(vertices, faces, count)
     laplacian = core.build_laplacian(points)
     dense, _ = random_points(vertices, faces, 400_000, 7)
-    exact = np.bincount(cKDTree(points).query(dense, workers=-1)[1], minlength=count) / len(dense)
-    near = cKDTree(points).query(points, k=60, workers=-1)[1]
+    exact = np.bincount(cKDTree(points).query(dense, workers=cores())[1], minlength=count) / len(dense)
+    near = cKDTree(points).query(points, k=60, workers=cores())[1]
     return points, laplacian.areas[near].sum(axis=1) / exact[near].sum(axis=1) - 1.0
 
 

@@ -20,6 +20,7 @@ import potpourri3d
 from scipy.spatial import cKDTree
 
 import core
+from core.cores import cores
 from core.geometry import cloud
 from core.operator import laplacian, stiffness
 
@@ -123,7 +124,7 @@ def time_queries(points, neighbors):
     tree = cKDTree(points)
     for count in (41, neighbors + 1):
         for rows in np.array_split(points, len(points) * count // (1 << 22) + 1):
-            tree.query(rows, count, workers=-1)
+            tree.query(rows, count, workers=cores())
     return time.perf_counter() - began
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 import core
+from core.cores import cores
 
 from .real_shapes import noisy_points, random_points, seen_points, shapes
 from .tables import Table
@@ -48,7 +49,7 @@ of 10 % in its box.
 
 def spacings_and_normals(points):
     """Spacing at each point, by its twelve neighbors, and the normal of the plane through them."""
-    distance, index = cKDTree(points).query(points, k=13, workers=-1)
+    distance, index = cKDTree(points).query(points, k=13, workers=cores())
     offset = points[index] - points[index].mean(axis=1, keepdims=True)
     return distance[:, 12] * np.sqrt(np.pi / 12.0), np.linalg.eigh(np.swapaxes(offset, 1, 2) @ offset)[1][:, :, 0]
 

@@ -1,8 +1,9 @@
 """Run the tests: core without Blender, the wheel, the extension in Blender's module, and in a window with real keys.
 
-As many suites run side by side as there are processors, while this program makes the environments of the next ones;
-each but the window's in four parts, of every fourth file, so that no processor waits long for the last. What pytest
-prints goes to a file per suite in build/tests/, and from there to the screen where a test fails.
+As many suites run side by side as there are cores, of the machine, a container or by MESHFREE_CORES, while this
+program makes the environments of the next ones; each but the window's in four parts, of every fourth file, so that no
+core waits long for the last. What pytest prints goes to a file per suite in build/tests/, and from there to the screen
+where a test fails.
 """
 
 import argparse
@@ -20,6 +21,9 @@ import package
 import pythons
 from environments import ROOT, ensure, ensure_blender, isolated, run
 
+sys.path.insert(0, str(ROOT))
+from core.cores import cores
+
 RESULTS = ROOT / "build" / "tests"
 MEASURED = "core-3.13"  # environment whose coverage is measured, at almost no cost
 LIMIT = 2700  # seconds for one run of pytest
@@ -31,7 +35,7 @@ class Suites:
     """Runs of pytest side by side."""
 
     def __init__(self):
-        self._pool = ThreadPoolExecutor(os.cpu_count())
+        self._pool = ThreadPoolExecutor(cores())
         self._runs = []
         self._processes = set()
 
@@ -164,10 +168,10 @@ def main():
     began = time.monotonic()
     found = [] if options.gui else list(pythons.find().items())[: None if options.all else 1]
     with Suites() as suites:
-        cores = {f"core-{version}": ensure(f"core-{version}", "test", python) for version, python in found}
+        of_core = {f"core-{version}": ensure(f"core-{version}", "test", python) for version, python in found}
         # Results must not depend on the number of threads: the last one has as many as in Blender.
-        threads = {name: {"OPENBLAS_NUM_THREADS": None} for name in list(cores)[-1:] if options.all}
-        for name, python in cores.items():
+        threads = {name: {"OPENBLAS_NUM_THREADS": None} for name in list(of_core)[-1:] if options.all}
+        for name, python in of_core.items():
             suites.start_folder(name, python, "tests/core", **threads.get(name, {}))
         for version, python in found:
             suites.start(f"wheel-{version}", ensure(f"wheel-{version}", "wheel", python), "tests/wheel")
