@@ -519,6 +519,32 @@ def test_help(command, capfd, verb):
     assert "--at-once" not in shown
 
 
+@pytest.mark.any_blender
+def test_verbs_without_blender_have_the_settings_of_those_in_it(command):
+    """By name, default, bounds, choices, unit and description: there may be more in Blender, which has objects."""
+    as_setting, in_blender = part("operators.files.arguments").as_setting, {v.name: v for v in command.make_verbs()}
+    compared = []
+    for verb in part("command.verbs").make_verbs():
+        assert verb.name in in_blender
+        own = getattr(verb, "settings", ())
+        known = {item.identifier: item for item in in_blender[verb.name].operator.properties} if own else {}
+        for setting in own:
+            if verb.name == "analyze":  # whose settings Blender's verb takes as they are
+                continue
+            theirs, what = as_setting(known[setting.name]), (verb.name, setting.name)
+            exact = isinstance(setting.default, (bool, str))
+            assert theirs.default == (setting.default if exact else pytest.approx(setting.default, rel=1e-6)), what
+            assert theirs.form == setting.form, what
+            for bound, end in ((setting.least, theirs.least), (setting.most, theirs.most)):
+                assert bound is None or bound == pytest.approx(end, rel=1e-6), what
+            if what != ("stray-points", "action"):  # in Blender they can be selected and hidden, too
+                assert theirs.choices == setting.choices, what
+            if what not in {("stray-points", "action"), ("simulate", "frames")}:  # files have no scene
+                assert theirs.description == setting.description, what
+            compared.append(what)
+    assert len(compared) > 50
+
+
 def test_meshes_of_points_far_away_stand_where_these_are_exported(run, tmp_path):  # noqa: F811
     """In the interface, too: the object of the mesh keeps the shift of the import."""
     bpy.ops.meshfree.import_points(filepath=str(write(tmp_path / "a.csv", POINTS + FAR)))

@@ -82,6 +82,13 @@ def test_its_program_goes_from_files_to_files(place, tmp_path):
     assert "usage: meshfree" in call(program(place, "meshfree"), "--help", cwd=tmp_path)
 
 
+def test_every_verb_runs_on_the_example(place, tmp_path):
+    shutil.copy(ROOT / "docs" / "coral.ply", tmp_path)
+    lines = call(program(place, "python"), ROOT / "tests" / "wheel" / "every_verb.py", cwd=tmp_path).splitlines()
+    assert len(lines) >= 30
+    assert [line for line in lines if not line.endswith(" 0 done")] == []
+
+
 USER = """
 import numpy as np
 
