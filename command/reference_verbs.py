@@ -1,10 +1,15 @@
 """Verbs that hold clouds against that of another file."""
 
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
-from . import alignment, clouds, comparison, core
+import numpy as np
+
+from . import alignment, clouds, colors, comparison, core, transferring
 from .cloud_verb import CloudVerb, SurfaceVerb, floaters
-from .quantities import COMPARED, written_by
+from .quantities import COMPARED, TRANSFER, quantity, written_by
+from .results import number_text
 from .settings import LAPLACIAN, chosen
 
 
@@ -82,3 +87,66 @@ class Compare(SurfaceVerb):
         line = comparison.line(found, path.stem, reference.name, "{:.4g}".format)
         figures = {"points": len(cloud.points), "done": line, **comparison.figures(found)}
         return figures, [*told, *comparison.left_out(found, reference.name), *written]
+
+
+class TransferAttributes(SurfaceVerb):
+    """The verb `transfer-attributes`."""
+
+    name, operator = "transfer-attributes", "transfer_attributes"
+    help = "colors, numbers, vectors and labels from the surface of those of another file"
+    settings = (*transferring.MATCH.values(), *transferring.ATTRIBUTES.values())
+    reads = ("reference",)
+    _target = _laplacian = _values = None  # of the reference
+
+    def add_options(self, parser):
+        add_reference(parser, "points whose attributes are taken")
+        super().add_options(parser)
+
+    def work(self, path, given, arguments, output, progress):
+        reference, values = Path(arguments.reference), chosen(LAPLACIAN.values(), arguments)
+        own = SimpleNamespace(**chosen(self.settings, arguments))
+        if self._target is None:
+            target = clouds.Cloud(reference, self.read(reference, arguments), floaters(arguments))
+            self._values = _values(target, own)
+            self._laplacian = self.build(target, values, progress).laplacian
+            self._target = target
+        cloud, (arrays, left_out) = clouds.Cloud(path, given, floaters(arguments)), self._values
+        laplacian = self.build(cloud, values, progress).laplacian
+        offsets = [self._target.place - cloud.place]
+        match = transferring.matched(laplacian, [self._laplacian], offsets, own, path.stem, [str(reference)], progress)
+        smooth = [name for name, column in arrays.items() if _is_smooth(name, column)]
+        new = transferring.taken(match, arrays, smooth, progress)
+        notices, line = transferring.told(match, transferring.counted(arrays), path.stem, str(reference), number_text)
+        told = [*self._target.notices, *transferring.left_out(left_out), *notices]
+        if output is not None:
+            told += _write_taken(output, cloud, new, match.state)
+        return {"points": len(cloud.points), "done": line, **match.figures}, [*laplacian.notices, *told]
+
+
+def _values(cloud, own):
+    """Return the columns of a cloud that settings ask for, by name, colors as linear ones; and which are left out."""
+    columns, tint = dict(cloud.columns), cloud.given.colors if cloud.splats is None else None
+    if tint is not None:
+        columns[colors.COLOR] = colors.linear(np.asarray(tint, dtype=np.float64))
+    wanted = {name: column for name, column in columns.items() if transferring.is_wanted(name, own, colors.COLOR)}
+    found = {name: column for name, column in wanted.items() if np.isfinite(column).all()}
+    transferring.check_found(found, own, str(cloud.path))
+    return found, sorted(wanted.keys() - found.keys())
+
+
+def _is_smooth(name, column):
+    """Whether numbers are averaged: those that are no labels."""
+    return column.dtype.kind == "f" and quantity(name).carried != "label"
+
+
+def _write_taken(output, cloud, new, state):
+    """Write a cloud with what it has taken, by name; return notices."""
+    given, tint, state = cloud.given, new.pop(colors.COLOR, None), {TRANSFER: state}
+    if output.suffix.lower() == ".npz":
+        return clouds.write(output, given, {**new, **state} | ({} if tint is None else {"colors": colors.srgb(tint)}))
+    if cloud.splats is not None:
+        kept = [] if tint is None else ["Splats have colors of their own, so that none are taken."]
+        return [*clouds.write(output, given, {**new, **state}), *kept]
+    if tint is not None:
+        given = replace(given, colors=np.clip(colors.srgb(tint), 0.0, 1.0).astype(np.float32))
+    return clouds.write(output, replace(given, attributes={**given.attributes, **new}), state)

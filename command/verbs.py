@@ -13,7 +13,7 @@ from .measures import check_labels, check_numbers, part_table
 from .mesh_verb import Mesh
 from .moving_verbs import MinimalSurface, ModeShape, Smooth
 from .quantities import SEGMENT, STRAY, eigenvector_name, written_by
-from .reference_verbs import Align, Compare
+from .reference_verbs import Align, Compare, TransferAttributes
 from .result_verbs import (
     HarmonicField,
     Orient,
@@ -33,7 +33,9 @@ from .table_verbs import Profile, Section
 def make_verbs() -> list:
     """Return new verbs of all kinds: those on surfaces, those on points, and those that need no object."""
     on_surfaces = (Analyze, *_MEASURING, *_MOVING, Mesh, Segment, Signature, *_ALONG, HarmonicField)
-    return [verb() for verb in (*on_surfaces, StrayPoints, ThinOut, Align, Compare)] + without_object()
+    return [
+        verb() for verb in (*on_surfaces, StrayPoints, ThinOut, Align, Compare, TransferAttributes)
+    ] + without_object()
 
 
 def without_object() -> list:

@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 from bpy.props import StringProperty
 
+from ...command.colors import COLOR
 from ...command.groups import column_weights
 from ...command.quantities import NORMAL, PREFIX
 from ...core.files import (
@@ -18,7 +19,7 @@ from ...core.files import (
 from ...core.files.table import NORMAL as FILE_NORMAL
 from ...core.files.table import SCANNER
 from ..objects.attributes import ONLY_DRAWN, STORABLE, own_positions, read_attribute, type_of, write_attribute
-from ..objects.colors import COLOR, own_colors
+from ..objects.colors import own_colors
 from ..objects.groups import add_group, has_group
 from ..objects.place import OFFSET, place_of
 from ..objects.reading import seen_positions

@@ -32,11 +32,7 @@ class _TransferFrom(WithReference):
         tool.given = self._reference.source
 
     def figures(self, tool, result):
-        match = result.match
-        return {
-            "taken_count": int(match.places.known.sum()),
-            "within": match.places.limit,
-        }
+        return result.match.figures
 
 
 class WeightsFrom(_TransferFrom):

@@ -8,7 +8,6 @@ from .attributes import SOLID, read_attribute
 from .modifiers import DISPLAY_TAG, get_input, is_display
 from .splats import BASE, has_splats
 
-COLOR = "Color"  # the name that imported ones get
 COLORS = "BYTE_COLOR", "FLOAT_COLOR"  # types of attributes
 _GAMMA = 2.2  # splats are trained in sRGB
 

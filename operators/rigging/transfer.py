@@ -1,13 +1,13 @@
 """What points take from the surface of other objects: matching, and what all such tools have in common."""
 
-import math
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 from bpy.props import BoolProperty, FloatProperty
 
-from ... import core
-from ...command.quantities import TRANSFER, quantity
+from ...command import transferring
+from ...command.quantities import TRANSFER
 from ...core import PointCloudError
 from ..objects.attributes import tag_changed, write_attribute
 from ..objects.handlers import notify
@@ -16,7 +16,6 @@ from ..objects.result import length_text
 from ..running.application import ShownOperator, Tool, chosen_objects, naming, operator_reader
 
 _BUILDING = 0.7  # share of the time that the operators of all objects take
-_FILLED, _TAKEN, _FAR = range(len(quantity(TRANSFER).names))
 
 
 class Source(NamedTuple):
@@ -39,30 +38,6 @@ class Source(NamedTuple):
     values: Any
 
 
-class Match(NamedTuple):
-    """Where the points of an object lie on the surface of sources.
-
-    Attributes
-    ----------
-    laplacian : LaplaceBeltrami
-        Of the object.
-    places : SurfaceMatch
-    state : ndarray, (n,) int
-        The number of a name of the result `TRANSFER`.
-    notices : list of str
-        About surfaces whose sheets are hardly told apart.
-    """
-
-    laplacian: Any
-    places: Any
-    state: np.ndarray
-    notices: list
-
-    def share(self, state) -> float:
-        """Return the share of the points in a state."""
-        return np.count_nonzero(self.state == state) / len(self.state)
-
-
 class Transfer(Tool):
     """Settings and work of tools that take values from the surface of other objects.
 
@@ -78,22 +53,8 @@ class Transfer(Tool):
         description="From the other selected objects to the active one; otherwise from the active one to the others",
         default=False,
     )
-    distance: FloatProperty(
-        name="Distance",
-        description="Points farther from the surface are filled in from around; 0 for 5 % of the size of the source, or"
-        " two spacings of its points",
-        default=0.0,
-        min=0.0,
-        subtype="DISTANCE",
-    )
-    angle: FloatProperty(
-        name="Angle",
-        description="Points whose normals differ more from those of the surface are filled in from around",
-        default=math.radians(30.0),
-        min=math.radians(1.0),
-        max=math.radians(90.0),
-        subtype="ANGLE",
-    )
+    distance: FloatProperty(name="Distance", subtype="DISTANCE", **transferring.MATCH["distance"].keywords)
+    angle: FloatProperty(name="Angle", subtype="ANGLE", **transferring.MATCH["angle"].keywords)
     preview: BoolProperty(
         name="Preview",
         description="Only color the points by what they would take, and change nothing else",
@@ -142,8 +103,8 @@ class Transfer(Tool):
         """Read an object, and return that, and a function of a progress callback that matches it with sources."""
         reading, operator = operator_reader(context, obj)
         offsets = np.array([source.place for source in sources]) - self.place(obj)
-        settings = {"distance": self.distance or None, "angle": min(self.angle, 0.5 * math.pi), "members": members}
-        name, names = obj.name, source_names(sources)
+        own = SimpleNamespace(distance=self.distance, angle=self.angle)
+        name, names = obj.name, [source.name for source in sources]
 
         def find(progress):
             def part(number):
@@ -155,18 +116,9 @@ class Transfer(Tool):
                 with naming(source.name):
                     laplacians.append(source.operator(part(number)))
             laplacian = operator(part(len(sources)))
-            places = core.match_surface(
-                laplacian, laplacians, offsets=offsets, **settings, progress=lambda stage, _: progress(stage, _BUILDING)
+            return transferring.matched(
+                laplacian, laplacians, offsets, own, name, names, lambda stage, _: progress(stage, _BUILDING), members
             )
-            if not places.known.any():
-                raise PointCloudError(
-                    f'No point of "{name}" lies within {places.limit:.3g} of the surface of {names}, with normals that'
-                    " agree. Move the objects onto each other, or raise Distance or Angle."
-                )
-            reached = np.isin(laplacian.component, laplacian.component[places.known])
-            state = np.where(places.known, _TAKEN, np.where(reached, _FILLED, _FAR))
-            each = zip([*(source.name for source in sources), name], [*laplacians, laplacian], strict=True)
-            return Match(laplacian, places, state, [text for named in each for text in _close_sheets(*named)])
 
         return reading, find
 
@@ -174,27 +126,8 @@ class Transfer(Tool):
         """Write how points get what they take; return notices, and a line for the status bar."""
         write_attribute(obj.data, TRANSFER, match.state)
         tag_changed(obj.data)
-        far = np.count_nonzero(match.state == _FAR)
-        take, are = ("would take", "would be") if self.preview else ("take", "are")
-        line = (
-            f"{obj.name}: {match.share(_TAKEN):.1%} of the points {take} {what} from {source_names(sources)},"
-            f" within {length_text(match.places.limit)}, {match.share(_FILLED):.1%} {are} filled in"
-        )
-        notices = [
-            f"Points of parts of {obj.name} of which none is near the source: {far:,}. They have the values of the"
-            " nearest point that is. Raise Distance, or move the objects onto each other."
-        ]
-        return [*(notices if far else ()), *match.notices, line]
-
-
-def _close_sheets(name, laplacian) -> list:
-    """Return a notice of the points of an object between whose sheets values may get across."""
-    causes = core.Doubt
-    count = np.count_nonzero(laplacian.doubt == causes.SHEETS)
-    return [
-        f"Sheets of {name} are as close to each other as its points are, at {count:,} of them. Values may get from one"
-        " sheet to the other there. Add points, or transfer each sheet alone."
-    ][: min(count, 1)]
+        notices, line = transferring.told(match, what, obj.name, source_names(sources), length_text, self.preview)
+        return [*notices, line]
 
 
 def sides(context, reverse):

@@ -1,14 +1,13 @@
 """Transfer Attributes: points take colors, numbers, vectors and labels from the surface of other objects."""
 
-from fnmatch import fnmatchcase
 from typing import NamedTuple
 
 import bpy
 import numpy as np
 from bpy.props import EnumProperty, StringProperty
 
-from ... import core
-from ...command.quantities import PREFIX, quantity
+from ...command import transferring
+from ...command.quantities import quantity
 from ...core import PointCloudError
 from ..objects.attributes import STORABLE, check_names, point_count, read_attribute, write_attribute
 from ..objects.colors import COLORS, own_colors
@@ -17,7 +16,6 @@ from .transfer import Transfer, TransferOperator
 
 _SMOOTH = ("FLOAT", "FLOAT_VECTOR", "FLOAT2", *COLORS)  # types whose values are averaged
 _LABELS = ("INT", "BOOLEAN", "QUATERNION", "FLOAT4")  # and those that are taken from the nearest point
-_NAMED = 5  # attributes that a notice names
 _OWN = ("position", "radius")  # what Blender itself keeps at points, beside names with a leading dot
 
 
@@ -64,19 +62,14 @@ class TransferAttributes(Transfer):
 
     attributes: EnumProperty(
         name="Attributes",
-        description="Which attributes of the source are transferred",
         items=[
             ("ALL", "All Attributes", "All attributes at points, but for results of this extension"),
             ("COLOR", "Active Color", "The colors that the source is shown in"),
             ("NAMES", "By Name", "Those whose names match the pattern, results of this extension among them"),
         ],
-        default="ALL",
+        **transferring.ATTRIBUTES["attributes"].keywords,
     )
-    pattern: StringProperty(
-        name="Pattern",
-        description="Names of attributes, for By Name: * stands for any text, ? for one character",
-        default="*",
-    )
+    pattern: StringProperty(name="Pattern", **transferring.ATTRIBUTES["pattern"].keywords)
 
     def shown_result(self):
         return self._shown
@@ -94,24 +87,12 @@ class TransferAttributes(Transfer):
                 left_out.append(name)
             else:
                 found[name] = values
-        if not found:
-            what = {
-                "ALL": "attributes at its points, beside results of this extension",
-                "COLOR": "colors",
-                "NAMES": f'attributes at its points that match "{self.pattern}"',
-            }[self.attributes]
-            raise PointCloudError(f'"{obj.name}" has no {what}. Choose other Attributes, or another source.')
+        transferring.check_found(found, self, f'"{obj.name}"')
         return _Attributes(found, left_out)
 
     def _wants(self, name, color):
-        if self.attributes == "COLOR":
-            return name == color
-        if name.startswith(".") or name in _OWN:
-            return False
-        ours = name.startswith(PREFIX)
-        if self.attributes == "ALL":
-            return not ours
-        return fnmatchcase(name, self.pattern) and (not ours or bool(quantity(name).attribute))
+        hidden = self.attributes != "COLOR" and (name.startswith(".") or name in _OWN)
+        return not hidden and transferring.is_wanted(name, self, color)
 
     def plan(self, context, obj):
         sources = self.sources(context, obj)
@@ -126,17 +107,12 @@ class TransferAttributes(Transfer):
         arrays = {name: np.concatenate([values.found[name].array for values in given]) for name in names}
         smooth = [name for name in names if first[name].smooth]
         preview = self.preview
-        notices = []
-        if left_out:
-            notices.append(
-                "Attributes that are left out, since they are not at points, not finite, or not of one type in all"
-                f" sources: {', '.join(left_out[:_NAMED])}{', ...' if len(left_out) > _NAMED else ''}."
-            )
+        notices = transferring.left_out(left_out)
 
         def compute(progress):
             match, new = find(progress), {}
             if not preview:
-                new = _taken(match, arrays, smooth, lambda stage, share: progress(stage, 0.8 + 0.2 * share))
+                new = transferring.taken(match, arrays, smooth, lambda stage, share: progress(stage, 0.8 + 0.2 * share))
                 for name in names:
                     if first[name].data_type == "FLOAT_VECTOR":
                         new[name] = reading.local(new[name])
@@ -145,8 +121,7 @@ class TransferAttributes(Transfer):
         return compute
 
     def write(self, context, obj, result):
-        count = len(result.sources[0].values.found)
-        what = f"{count} {'attribute' if count == 1 else 'attributes'}"
+        what = transferring.counted(result.sources[0].values.found)
         texts = self.write_state(obj, result.match, result.sources, what)
         for name, (data_type, values) in result.values.items():
             write_attribute(obj.data, name, values, data_type)
@@ -195,22 +170,6 @@ def _colors(data, attribute):
     np.add.at(total, owner, colors)
     corners = np.bincount(owner, minlength=len(total))
     return total / np.maximum(corners, 1)[:, None]
-
-
-def _taken(match, arrays, smooth, progress):
-    """Return the values of the points by name: averages of the smooth ones, and others from the nearest point each."""
-    result = {}
-    if smooth:
-        columns = [arrays[name].reshape(len(arrays[name]), -1) for name in smooth]
-        found = core.transfer_values(match.laplacian, match.places, np.column_stack(columns), progress=progress)
-        ends = np.cumsum([column.shape[1] for column in columns])[:-1]
-        for name, part in zip(smooth, np.split(found, ends, axis=1), strict=True):
-            result[name] = part.reshape(len(part), *arrays[name].shape[1:])
-    labels = [name for name in arrays if name not in smooth]
-    if labels:
-        rows = core.transfer_labels(match.laplacian, match.places, np.arange(match.places.weights.shape[1]))
-        result |= {name: arrays[name][rows] for name in labels}
-    return {name: result[name] for name in arrays}
 
 
 class MESHFREE_OT_transfer_attributes(TransferAttributes, TransferOperator, bpy.types.Operator):

@@ -6,11 +6,12 @@ import numpy as np
 from bpy.props import BoolProperty, FloatProperty
 
 from ... import core
+from ...command.colors import COLOR
 from ...command.meshing import GAP, MESH
 from ...command.quantities import quantity
 from ..objects.attributes import DISC, STORABLE, point_count, read_attribute, write_attribute
 from ..objects.color_choices import COLOR_CHOICES
-from ..objects.colors import COLOR, COLORS, own_colors, splat_colors
+from ..objects.colors import COLORS, own_colors, splat_colors
 from ..objects.groups import add_group
 from ..objects.handlers import notify
 from ..objects.place import activate, copy_place, hide

@@ -7,11 +7,11 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import core
-from benchmarks.samplings import fibonacci_sphere, square_grid
-from command import motions, verbs
+from benchmarks.samplings import fibonacci_sphere, random_sphere, square_grid
+from command import colors, motions, verbs
 from command.cloud_verb import CloudVerb
 from command.main import run as run_command
-from core.files import read_points
+from core.files import PointTable, read_points, write_points
 from tests.core.test_command import FAR, write
 
 SPHERE = fibonacci_sphere(800)
@@ -369,6 +369,49 @@ class TestTables:
         assert (code, "same point" in line["error"]) == (1, True)
 
 
+class TestTransferAttributes:
+    def test_numbers_are_averaged_labels_are_not_and_digits_stay(self, run, tmp_path):
+        points, again = SPHERE, random_sphere(500, 4)
+        time = 4e8 + points[:, 2]  # more digits than single precision has
+        gray = 0.5 + 0.5 * points[:, 2:]
+        tint = np.hstack([gray, gray, gray, np.ones((800, 1))]).astype(np.float32)
+        table = PointTable(points + FAR, {"time": time, "part": (points[:, 0] > 0.0).astype(np.int32)}, tint)
+        write_points(tmp_path / "given.ply", table)
+        source = write(tmp_path / "a.ply", again + FAR, row=np.arange(500))
+        code, [line] = run(
+            "transfer-attributes", source, "--reference", tmp_path / "given.ply", "--out", tmp_path / "b.ply"
+        )
+        assert (code, line["taken_count"]) == (0, 500), line
+        assert f"a: 100.0% of the points take 3 attributes from {tmp_path / 'given.ply'}" in line["done"]
+        found = read_points(tmp_path / "b.ply")
+        assert_allclose(found.attributes["time"] - 4e8, again[:, 2], atol=0.02)
+        clear = np.abs(again[:, 0]) > 0.1
+        assert_array_equal(found.attributes["part"][clear], (again[:, 0] > 0.0)[clear])
+        assert_allclose(found.colors[:, 0], 0.5 + 0.5 * again[:, 2], atol=0.03)
+        assert_array_equal(found.attributes["row"], np.arange(500))
+        assert (found.attributes["lb_transfer"] == 1).all()
+
+    def test_by_name_and_far_away(self, run, tmp_path):
+        given = write(tmp_path / "given.ply", SPHERE, heat=SPHERE[:, 2], lb_cell=np.arange(800))
+        source = write(tmp_path / "a.ply", SPHERE[::2])
+        named = "--attributes", "names", "--pattern", "lb_*", "--out", tmp_path / "a.npz"
+        code, [line] = run("transfer-attributes", source, "--reference", given, *named)
+        assert code == 0, line
+        found = np.load(tmp_path / "a.npz")
+        assert set(found.files) == {"points", "cell", "transfer"}
+        assert_array_equal(found["cell"], np.arange(800)[::2])
+        code, [line] = run("transfer-attributes", source, "--reference", given, "--attributes", "color")
+        assert (code, "has no colors" in line["error"]) == (1, True)
+        away = write(tmp_path / "away.ply", SPHERE + [9.0, 0.0, 0.0])
+        code, [line] = run("transfer-attributes", away, "--reference", given)
+        assert (code, 'No point of "away" lies within' in line["error"]) == (1, True)
+
+    def test_colors_go_to_linear_ones_and_back(self):
+        given = np.column_stack([np.linspace(0.0, 1.0, 64)[:, None] * [1.0, 0.5, 0.1], np.full(64, 0.3)])
+        assert_allclose(colors.srgb(colors.linear(given)), given, atol=1e-7)
+        assert_allclose(colors.linear(np.array([[0.5, 0.02, 1.0, 0.7]])), [[0.214041, 0.00154799, 1.0, 0.7]], rtol=1e-5)
+
+
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -400,6 +443,7 @@ def test_wrong_usage(run, arguments):
 NEEDED = {
     "align": ("--reference", "plan.ply"),
     "compare": ("--reference", "plan.ply"),
+    "transfer-attributes": ("--reference", "plan.ply"),
     "signed-distance": ("--curve", "plan.ply"),
     "profile": ("--from", "0,0,1", "--to", "1,0,0"),
     **dict.fromkeys(

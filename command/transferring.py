@@ -1,0 +1,195 @@
+"""What points take from the surface of others, for the command line and for Blender's tools."""
+
+import math
+from fnmatch import fnmatchcase
+from typing import NamedTuple
+
+import numpy as np
+
+from . import core
+from .quantities import PREFIX, TRANSFER, quantity
+from .settings import Setting, radians
+
+FILLED, TAKEN, FAR = range(len(quantity(TRANSFER).names))
+_NAMED = 5  # attributes that a notice names
+
+MATCH = {
+    setting.name: setting
+    for setting in (
+        Setting(
+            "distance",
+            "Points farther from the surface are filled in from around; 0 for 5 % of the size of the source, or two"
+            " spacings of its points",
+            0.0,
+            0.0,
+            form="LENGTH",
+        ),
+        Setting(
+            "angle",
+            "Points whose normals differ more from those of the surface are filled in from around",
+            math.radians(30.0),
+            math.radians(1.0),
+            math.radians(90.0),
+            convert=radians,
+            form="DEGREES",
+        ),
+    )
+}
+ATTRIBUTES = {
+    setting.name: setting
+    for setting in (
+        Setting(
+            "attributes",
+            "Which attributes of the source are transferred",
+            "ALL",
+            choices=("ALL", "COLOR", "NAMES"),
+        ),
+        Setting("pattern", "Names of attributes, for By Name: * stands for any text, ? for one character", "*"),
+    )
+}
+
+
+class Match(NamedTuple):
+    """Where points lie on the surface of sources.
+
+    Attributes
+    ----------
+    laplacian : LaplaceBeltrami
+        Of the points.
+    places : SurfaceMatch
+    state : ndarray, (n,) int
+        The number of a name of the result `TRANSFER`.
+    notices : list of str
+        About surfaces whose sheets are hardly told apart.
+    """
+
+    laplacian: "core.LaplaceBeltrami"
+    places: "core.SurfaceMatch"
+    state: np.ndarray
+    notices: list
+
+    def share(self, state) -> float:
+        """Return the share of the points in a state."""
+        return np.count_nonzero(self.state == state) / len(self.state)
+
+    @property
+    def figures(self) -> dict:
+        """What the command line prints of it."""
+        return {"taken_count": int(self.places.known.sum()), "within": self.places.limit}
+
+
+def matched(laplacian, sources, offsets, own, name, names, progress, members=None) -> Match:
+    """Find the places of points on the surface of others.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+    sources : list of LaplaceBeltrami
+    offsets : ndarray, (k, 3)
+        From the points of the operator to those of each source.
+    own : object
+        With the values of the settings in `MATCH` as its attributes.
+    name : str
+        Of the points, for errors and notices.
+    names : list of str
+        Of the sources.
+    progress : callable
+        Called as ``progress(stage, fraction)``.
+    members : ndarray, (n,) bool, optional
+        See `match_surface`.
+    """
+    places = core.match_surface(
+        laplacian,
+        sources,
+        offsets=offsets,
+        distance=own.distance or None,
+        angle=min(own.angle, 0.5 * math.pi),
+        members=members,
+        progress=progress,
+    )
+    if not places.known.any():
+        raise core.PointCloudError(
+            f'No point of "{name}" lies within {places.limit:.3g} of the surface of {", ".join(names)}, with normals'
+            " that agree. Move the objects onto each other, or raise Distance or Angle."
+        )
+    reached = np.isin(laplacian.component, laplacian.component[places.known])
+    state = np.where(places.known, TAKEN, np.where(reached, FILLED, FAR))
+    each = zip([*names, name], [*sources, laplacian], strict=True)
+    return Match(laplacian, places, state, [text for named in each for text in _close_sheets(*named)])
+
+
+def _close_sheets(name, laplacian) -> list:
+    """Return a notice of the points of a cloud of some name between whose sheets values may get across."""
+    causes = core.Doubt
+    count = np.count_nonzero(laplacian.doubt == causes.SHEETS)
+    return [
+        f"Sheets of {name} are as close to each other as its points are, at {count:,} of them. Values may get from one"
+        " sheet to the other there. Add points, or transfer each sheet alone."
+    ][: min(count, 1)]
+
+
+def told(match, what, name, names, length_text, preview=False) -> tuple:
+    """Return notices of how points of some name get what they take from others, and a line."""
+    far = np.count_nonzero(match.state == FAR)
+    take, are = ("would take", "would be") if preview else ("take", "are")
+    line = (
+        f"{name}: {match.share(TAKEN):.1%} of the points {take} {what} from {names},"
+        f" within {length_text(match.places.limit)}, {match.share(FILLED):.1%} {are} filled in"
+    )
+    notice = (
+        f"Points of parts of {name} of which none is near the source: {far:,}. They have the values of the nearest"
+        " point that is. Raise Distance, or move the objects onto each other."
+    )
+    return [*([notice] if far else []), *match.notices], line
+
+
+def is_wanted(name, own, color) -> bool:
+    """Whether an attribute is transferred by settings, which may ask for the colors alone."""
+    if own.attributes == "COLOR":
+        return name == color
+    ours = name.startswith(PREFIX)
+    if own.attributes == "ALL":
+        return not ours
+    return fnmatchcase(name, own.pattern) and (not ours or bool(quantity(name).attribute))
+
+
+def check_found(found, own, where):
+    """Refuse a source of some name that has nothing that the settings ask for."""
+    if not found:
+        what = {
+            "ALL": "attributes at its points, beside results of this extension",
+            "COLOR": "colors",
+            "NAMES": f'attributes at its points that match "{own.pattern}"',
+        }[own.attributes]
+        raise core.PointCloudError(f"{where} has no {what}. Choose other Attributes, or another source.")
+
+
+def left_out(names) -> list:
+    """Return a notice of attributes that are not transferred."""
+    if not names:
+        return []
+    return [
+        "Attributes that are left out, since they are not at points, not finite, or not of one type in all"
+        f" sources: {', '.join(names[:_NAMED])}{', ...' if len(names) > _NAMED else ''}."
+    ]
+
+
+def counted(names) -> str:
+    """Return how many attributes there are as a text."""
+    return f"{len(names)} {'attribute' if len(names) == 1 else 'attributes'}"
+
+
+def taken(match, arrays, smooth, progress) -> dict:
+    """Return the values of the points by name: averages of the smooth ones, and others from the nearest point each."""
+    result = {}
+    if smooth:
+        columns = [arrays[name].reshape(len(arrays[name]), -1) for name in smooth]
+        found = core.transfer_values(match.laplacian, match.places, np.column_stack(columns), progress=progress)
+        ends = np.cumsum([column.shape[1] for column in columns])[:-1]
+        for name, part in zip(smooth, np.split(found, ends, axis=1), strict=True):
+            result[name] = part.reshape(len(part), *arrays[name].shape[1:])
+    labels = [name for name in arrays if name not in smooth]
+    if labels:
+        rows = core.transfer_labels(match.laplacian, match.places, np.arange(match.places.weights.shape[1]))
+        result |= {name: arrays[name][rows] for name in labels}
+    return {name: result[name] for name in arrays}
