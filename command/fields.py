@@ -114,13 +114,7 @@ def solved(laplacian, shares, source, low, high, cache, progress):
     fixed = np.isfinite(shares)
     given = shares[fixed]
     if source is None:  # between 0 and 1, so that both values can change without solving again
-        field = cache.result(
-            laplacian,
-            "harmonic",
-            fixed,
-            given,
-            compute=lambda: core.harmonic_field(laplacian, fixed, given, progress=progress),
-        )
+        field = harmonic(laplacian, fixed, given, cache, progress)
         return low + (high - low) * field
     values = low + (high - low) * given
     return cache.result(
@@ -130,6 +124,17 @@ def solved(laplacian, shares, source, low, high, cache, progress):
         fixed,
         values,
         compute=lambda: core.solve_poisson(laplacian, source, fixed, values, progress=progress),
+    )
+
+
+def harmonic(laplacian, fixed, given, cache, progress):
+    """Return the harmonic field, (n,), with given values at the points that are fixed, (n,) bool."""
+    return cache.result(
+        laplacian,
+        "harmonic",
+        fixed,
+        given,
+        compute=lambda: core.harmonic_field(laplacian, fixed, given, progress=progress),
     )
 
 

@@ -38,12 +38,12 @@ def column_weights(values, name: str, where: str):
     return weights
 
 
-def check_enough(weights, group: str, setting: str, least: int = 1, how: str = ""):
-    """Refuse the weights in a group, (n,), of which fewer than a number are above zero; `how` it gets more."""
+def check_enough(weights, kind: str, name: str, setting: str, least: int = 1, how: str = ""):
+    """Refuse weights, (n,), of which fewer than a number are above zero; `how` the group of a kind gets more."""
     count = np.count_nonzero(weights > 0.0)
     if count < least:
         raise core.PointCloudError(
-            f"The {group} gives {count} of {len(weights)} points a weight above zero, and {setting}"
+            f'The {kind} "{name}" gives {count} of {len(weights)} points a weight above zero, and {setting}'
             f" takes at least {least}. Assign points to it{how}, or clear {setting}."
         )
 
@@ -51,7 +51,7 @@ def check_enough(weights, group: str, setting: str, least: int = 1, how: str = "
 def read_weights(cloud, name: str, option: str, least: int = 1):
     """Return the weights, (n,), in the column of a cloud that an option names."""
     weights = column_weights(cloud.numbers(name, option), name, str(cloud.path))
-    check_enough(weights, f'column "{name}" of {cloud.path}', option, least)
+    check_enough(weights, "column", name, option, least)
     return weights
 
 

@@ -13,38 +13,52 @@ from .results import number_text
 from .settings import LAPLACIAN, chosen, default_options
 
 
-class Smooth(SurfaceVerb):
+class MovingVerb(SurfaceVerb):
+    """A verb that moves points by their operator; `moved` of a subclass returns where to, and a line on that."""
+
+    def work(self, path, given, arguments, output, progress):
+        cloud = clouds.Cloud(path, given, floaters(arguments))
+        own = SimpleNamespace(**chosen(self.settings, arguments))
+        wanted = self.wanted(cloud, own)
+        laplacian = self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress).laplacian
+        points, line = self.moved(laplacian, wanted, path.stem, own, progress)
+        written = [] if output is None else _write(output, cloud, points, laplacian)
+        return {"points": len(points), "done": line}, [*laplacian.notices, *written]
+
+    def wanted(self, cloud, own):
+        """Return what the motion needs of a cloud beside its points, read before anything is computed."""
+        return None
+
+    def moved(self, laplacian, wanted, name, own, progress):
+        """Return the points, (n, 3), and a line on them, of a cloud of some name, by the values of the settings."""
+        raise NotImplementedError
+
+
+class Smooth(MovingVerb):
     """The verb `smooth`."""
 
     name = "smooth"
     help = "smooth the shape of the points: remove noise, soften details, keep a few modes, or strengthen details"
     settings = tuple(smoothing.SMOOTH.values())
 
-    def work(self, path, given, arguments, output, progress):
-        cloud = clouds.Cloud(path, given, floaters(arguments))
-        own = SimpleNamespace(**chosen(self.settings, arguments))
-        mask = read_weights(cloud, own.group, "--group") if own.group else None
-        laplacian = self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress).laplacian
-        points, _ = smoothing.smoothed(laplacian, own, mask, path.stem, uncached, progress)
-        written = [] if output is None else _write(output, cloud, points, laplacian)
-        line = smoothing.smooth_line(cloud.points, points, path.stem, number_text)
-        return {"points": len(points), "done": line}, [*laplacian.notices, *written]
+    def wanted(self, cloud, own):
+        return read_weights(cloud, own.group, "--group") if own.group else None
+
+    def moved(self, laplacian, wanted, name, own, progress):
+        points, _ = smoothing.smoothed(laplacian, own, wanted, name, uncached, progress)
+        return points, smoothing.smooth_line(laplacian.points, points, name, number_text)
 
 
-class ModeShape(SurfaceVerb):
+class ModeShape(MovingVerb):
     """The verb `mode-shape`."""
 
     name = "mode-shape"
     help = "displace the points along their normals by a vibration mode"
     settings = tuple(smoothing.MODE_SHAPE.values())
 
-    def work(self, path, given, arguments, output, progress):
-        cloud, own = clouds.Cloud(path, given, floaters(arguments)), chosen(self.settings, arguments)
-        laplacian = self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress).laplacian
-        points = smoothing.by_mode(laplacian, **own, cache=uncached, progress=progress)
-        written = [] if output is None else _write(output, cloud, points, laplacian)
-        line = smoothing.mode_line(cloud.points, points, own["mode"], path.stem, number_text)
-        return {"points": len(points), "done": line}, [*laplacian.notices, *written]
+    def moved(self, laplacian, wanted, name, own, progress):
+        points = smoothing.by_mode(laplacian, own.mode, own.amplitude, own.phase, uncached, progress)
+        return points, smoothing.mode_line(laplacian.points, points, own.mode, name, number_text)
 
 
 class MinimalSurface(SurfaceVerb):

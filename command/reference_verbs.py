@@ -8,6 +8,7 @@ import numpy as np
 
 from . import alignment, clouds, colors, comparison, core, transferring
 from .cloud_verb import CloudVerb, SurfaceVerb, floaters
+from .naming import naming
 from .quantities import COMPARED, TRANSFER, quantity, written_by
 from .results import number_text
 from .settings import LAPLACIAN, chosen
@@ -51,31 +52,45 @@ class Align(CloudVerb):
         return figures, [*target.notices, *alignment.doubts(found), *written]
 
 
-class Compare(SurfaceVerb):
+class ReferenceVerb(SurfaceVerb):
+    """A verb that holds surfaces against that of another file, which is read and analyzed once."""
+
+    reads = ("reference",)
+    use = ""  # what the reference is for, for the help
+    _target = _laplacian = None
+
+    def add_options(self, parser):
+        add_reference(parser, self.use)
+        super().add_options(parser)
+
+    def reference(self, arguments, progress):
+        """Return the cloud of the reference, and its operator."""
+        if self._target is None:
+            path = Path(arguments.reference)
+            given = self.read(path, arguments)  # whose errors have its name already
+            with naming(path):
+                target = clouds.Cloud(path, given, floaters(arguments))
+                self._laplacian = self.build(target, chosen(LAPLACIAN.values(), arguments), progress).laplacian
+            self._target = target
+        return self._target, self._laplacian
+
+
+class Compare(ReferenceVerb):
     """The verb `compare`."""
 
     name = operator = "compare"
     help = "signed distance of points from the surface of those of another file"
     settings = tuple(comparison.COMPARE.values())
-    reads = ("reference",)
-    _target = _laplacian = None  # of the reference, in its coordinates
-
-    def add_options(self, parser):
-        add_reference(parser, "point cloud from whose surface distances are measured")
-        super().add_options(parser)
+    use = "point cloud from whose surface distances are measured"
 
     def work(self, path, given, arguments, output, progress):
-        reference, values = Path(arguments.reference), chosen(LAPLACIAN.values(), arguments)
-        if self._target is None:
-            target = clouds.Cloud(reference, self.read(reference, arguments), floaters(arguments))
-            self._laplacian = self.build(target, values, progress).laplacian
-            self._target = target
-        target, cloud = self._target, clouds.Cloud(path, given, floaters(arguments))
+        (target, laplacian), reference = self.reference(arguments, progress), Path(arguments.reference)
+        cloud, values = clouds.Cloud(path, given, floaters(arguments)), chosen(LAPLACIAN.values(), arguments)
         normals, shift = self.build(cloud, values, progress).laplacian.normals, cloud.place - target.place
         names = path.stem, reference.stem
         own = chosen(self.settings, arguments)
         found, aligned = comparison.compared(
-            cloud.points + shift, normals, self._laplacian, **own, names=names, advice="", progress=progress
+            cloud.points + shift, normals, laplacian, **own, names=names, advice="", progress=progress
         )
         told, written = [*target.notices, *([] if aligned is None else alignment.doubts(aligned))], []
         if output is not None:
@@ -84,43 +99,34 @@ class Compare(SurfaceVerb):
                 moved = clouds.moved(given, cloud.points + shift, aligned.matrix, target.place)
             [deviation] = written_by(self.operator)
             written = clouds.write(output, moved, {deviation: found.distance, COMPARED: found.known})
-        line = comparison.line(found, path.stem, reference.name, "{:.4g}".format)
+        line = comparison.line(found, path.stem, reference.name, number_text)
         figures = {"points": len(cloud.points), "done": line, **comparison.figures(found)}
         return figures, [*told, *comparison.left_out(found, reference.name), *written]
 
 
-class TransferAttributes(SurfaceVerb):
+class TransferAttributes(ReferenceVerb):
     """The verb `transfer-attributes`."""
 
     name, operator = "transfer-attributes", "transfer_attributes"
     help = "colors, numbers, vectors and labels from the surface of those of another file"
     settings = (*transferring.MATCH.values(), *transferring.ATTRIBUTES.values())
-    reads = ("reference",)
-    _target = _laplacian = _values = None  # of the reference
-
-    def add_options(self, parser):
-        add_reference(parser, "points whose attributes are taken")
-        super().add_options(parser)
+    use = "points whose attributes are taken"
 
     def work(self, path, given, arguments, output, progress):
-        reference, values = Path(arguments.reference), chosen(LAPLACIAN.values(), arguments)
-        own = SimpleNamespace(**chosen(self.settings, arguments))
-        if self._target is None:
-            target = clouds.Cloud(reference, self.read(reference, arguments), floaters(arguments))
-            self._values = _values(target, own)
-            self._laplacian = self.build(target, values, progress).laplacian
-            self._target = target
-        cloud, (arrays, left_out) = clouds.Cloud(path, given, floaters(arguments)), self._values
-        laplacian = self.build(cloud, values, progress).laplacian
-        offsets = [self._target.place - cloud.place]
-        match = transferring.matched(laplacian, [self._laplacian], offsets, own, path.stem, [str(reference)], progress)
+        target, laplacian = self.reference(arguments, progress)
+        own, reference = SimpleNamespace(**chosen(self.settings, arguments)), arguments.reference
+        arrays, left_out = _values(target, own)
+        cloud, values = clouds.Cloud(path, given, floaters(arguments)), chosen(LAPLACIAN.values(), arguments)
+        built = self.build(cloud, values, progress).laplacian
+        offsets = [target.place - cloud.place]
+        match = transferring.matched(built, [laplacian], offsets, own, path.stem, [reference], progress)
         smooth = [name for name, column in arrays.items() if _is_smooth(name, column)]
         new = transferring.taken(match, arrays, smooth, progress)
-        notices, line = transferring.told(match, transferring.counted(arrays), path.stem, str(reference), number_text)
-        told = [*self._target.notices, *transferring.left_out(left_out), *notices]
+        notices, line = transferring.told(match, transferring.counted(arrays), path.stem, reference, number_text)
+        told = [*target.notices, *transferring.left_out(left_out), *notices]
         if output is not None:
             told += _write_taken(output, cloud, new, match.state)
-        return {"points": len(cloud.points), "done": line, **match.figures}, [*laplacian.notices, *told]
+        return {"points": len(cloud.points), "done": line, **match.figures}, [*built.notices, *told]
 
 
 def _values(cloud, own):

@@ -13,7 +13,36 @@ from .svg import profile_picture
 from .units import NO_UNITS
 
 
-class Section(SurfaceVerb):
+class CutOptions:
+    """The options of a verb that cuts, for what else is written; beside those of `sections.add_options`."""
+
+    def check(self, parser, arguments):
+        """Refuse curves without an output beside which they are written."""
+        check_beside(parser, arguments, "curves")
+
+    def beside(self, output, arguments):
+        """Return the path of the corners of the curves, if these are wanted."""
+        return [sections.corners_path(output)] if arguments.curves else []
+
+
+class PathOptions:
+    """The options of a verb that measures along a path."""
+
+    def add_options(self, parser):
+        """Add both ends of the path, and the picture."""
+        profiles.add_options(parser)
+        super().add_options(parser)
+
+    def check(self, parser, arguments):
+        """Refuse a picture without an output beside which it is written."""
+        check_beside(parser, arguments, "svg")
+
+    def beside(self, output, arguments):
+        """Return the path of the picture, if it is wanted."""
+        return [profiles.picture_path(output)] if arguments.svg else []
+
+
+class Section(CutOptions, SurfaceVerb):
     """The verb `section`."""
 
     name = "section"
@@ -30,12 +59,6 @@ class Section(SurfaceVerb):
         )
         sections.add_options(parser)
         super().add_options(parser)
-
-    def check(self, parser, arguments):
-        check_beside(parser, arguments, "curves")
-
-    def beside(self, output, arguments):
-        return [sections.corners_path(output)] if arguments.curves else []
 
     def work(self, path, given, arguments, output, progress):
         cloud, name = clouds.Cloud(path, given, floaters(arguments)), path.stem
@@ -56,23 +79,13 @@ class Section(SurfaceVerb):
         return figures, [*laplacian.notices, *guessed, *found.notices]
 
 
-class Profile(SurfaceVerb):
+class Profile(PathOptions, SurfaceVerb):
     """The verb `profile`."""
 
     name = "profile"
     help = "measure the height or a column along the shortest path between two positions, as a table"
     outputs = (".csv",)
     settings = tuple(profiles.PROFILE.values())
-
-    def add_options(self, parser):
-        profiles.add_options(parser)
-        super().add_options(parser)
-
-    def check(self, parser, arguments):
-        check_beside(parser, arguments, "svg")
-
-    def beside(self, output, arguments):
-        return [profiles.picture_path(output)] if arguments.svg else []
 
     def work(self, path, given, arguments, output, progress):
         cloud, name = clouds.Cloud(path, given, floaters(arguments)), path.stem

@@ -3,10 +3,10 @@
 import bpy
 
 from ...command import profiles, sections
-from ...command.inputs import check_beside
 from ...command.rows import TABLES, write_rows, write_text
 from ...command.settings import as_place
 from ...command.svg import profile_picture
+from ...command.table_verbs import CutOptions, PathOptions
 from ..objects.place import place_of
 from ..tools.measures import MeasureParts
 from ..tools.profile import Profile
@@ -43,7 +43,7 @@ class _MeasureInFile(MeasureParts):
         return super().write(context, obj, result)
 
 
-class Section(Apply):
+class Section(CutOptions, Apply):
     """The verb `section`, with a plane in the coordinates of the file, whose outputs hold measures."""
 
     left_out = LEFT_OUT | {"plane"}
@@ -66,15 +66,12 @@ class Section(Apply):
     def check(self, parser, arguments):
         if arguments.normal is not None and arguments.plane and as_place(arguments.plane) is None:
             parser.error("--normal goes with a position, not with an object, whose plane has one")
-        check_beside(parser, arguments, "curves")
+        super().check(parser, arguments)
 
     def prepare(self, tool, obj, path, arguments):
         tool.plane = arguments.plane or ""
         tool.place, tool.normal = as_place(tool.plane), arguments.normal
         self._arguments = arguments
-
-    def beside(self, output, arguments):
-        return [sections.corners_path(output)] if arguments.curves else []
 
     def save(self, tool, obj, output):
         if output.suffix.lower() == ".blend":
@@ -104,23 +101,13 @@ class _SectionInFile(CrossSection):
         return place, self.normal, sections.through_middle(obj.name)
 
 
-class ProfileBetween(Apply):
+class ProfileBetween(PathOptions, Apply):
     """The verb `profile`, between two positions in the coordinates of the file, whose outputs are tables."""
 
     outputs = (".csv", ".blend")
 
     def __init__(self):
         super().__init__("profile", _ProfileInFile)
-
-    def add_options(self, parser):
-        profiles.add_options(parser)
-        super().add_options(parser)
-
-    def check(self, parser, arguments):
-        check_beside(parser, arguments, "svg")
-
-    def beside(self, output, arguments):
-        return [profiles.picture_path(output)] if arguments.svg else []
 
     def prepare(self, tool, obj, path, arguments):
         self._arguments = arguments

@@ -8,6 +8,7 @@ import numpy as np
 from ... import core
 from ...command import alignment, comparison
 from ...command.groups import add_at, check_sources
+from ...command.naming import naming
 from ...command.orienting import imply_method
 from ...command.settings import as_place
 from ...command.source_verbs import add_curve
@@ -17,7 +18,7 @@ from ..objects.groups import assign
 from ..objects.options import laplacian_options
 from ..objects.place import offset_of, place_of
 from ..objects.reading import read_points as seen_points
-from ..running.application import build_operator, naming
+from ..running.application import build_operator
 from ..tools.align import Align
 from ..tools.along import SignedDistance
 from ..tools.compare import Compare

@@ -93,7 +93,7 @@ def chosen_weights(obj, name: str, setting: str, least: int = 1, outside=0.0):
         what = kind if obj.type == "MESH" else f"{kind} of truth values or numbers on points"
         raise PointCloudError(f'"{obj.name}" has no {what} named "{name}". Choose another {setting}, or clear it.')
     weights = group_weights(obj, name, outside)
-    check_enough(weights, f'{kind} "{name}"', setting, least, " in Edit Mode")
+    check_enough(weights, kind, name, setting, least, " in Edit Mode")
     return weights
 
 

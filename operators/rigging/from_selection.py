@@ -5,6 +5,7 @@ import numpy as np
 from bpy.props import EnumProperty, FloatProperty, StringProperty
 
 from ... import core
+from ...command import along, fields
 from ...command.groups import LOW, unreached
 from ...command.quantities import WEIGHT
 from ...core import PointCloudError
@@ -114,12 +115,7 @@ class WeightsFromSelection(Tool):
         shape = self.falloff.lower()
 
         def find(laplacian, progress):
-            distance = cache.result(
-                laplacian,
-                "distance",
-                ones,
-                compute=lambda: cache.geodesics(laplacian, progress).distance(ones, progress=progress),
-            )
+            distance = along.distance(laplacian, ones, cache, progress)
             return core.falloff(distance, radius, shape), np.isfinite(distance), f"within {length_text(radius)}"
 
         return find
@@ -136,13 +132,7 @@ class WeightsFromSelection(Tool):
         fixed, given = ones | zeros, ones[ones | zeros].astype(np.float64)
 
         def find(laplacian, progress):
-            field = cache.result(
-                laplacian,
-                "harmonic",
-                fixed,
-                given,
-                compute=lambda: core.harmonic_field(laplacian, fixed, given, progress=progress),
-            )
+            field = fields.harmonic(laplacian, fixed, given, cache, progress)
             known = np.unique(laplacian.component[fixed])
             reached = np.isin(laplacian.component, known) & ((laplacian.component >= 0) | fixed)
             return np.where(reached, np.clip(field, 0.0, 1.0), 0.0), reached, "between two ends"

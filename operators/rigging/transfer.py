@@ -7,13 +7,14 @@ import numpy as np
 from bpy.props import BoolProperty, FloatProperty
 
 from ...command import transferring
+from ...command.naming import naming
 from ...command.quantities import TRANSFER
 from ...core import PointCloudError
 from ..objects.attributes import tag_changed, write_attribute
 from ..objects.handlers import notify
 from ..objects.reading import TYPES, obstacle
 from ..objects.result import length_text
-from ..running.application import ShownOperator, Tool, chosen_objects, naming, operator_reader
+from ..running.application import ShownOperator, Tool, chosen_objects, operator_reader
 
 _BUILDING = 0.7  # share of the time that the operators of all objects take
 

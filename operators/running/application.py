@@ -1,11 +1,9 @@
 """Base classes of tools that apply the Laplacian: read all, compute, and only then write."""
 
-from contextlib import contextmanager
-
 from bpy.props import BoolProperty
 
 from ...command.analysis import Built
-from ...core import PointCloudError
+from ...command.naming import naming
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import DISC, write_attribute
 from ..objects.colors import own_material, shows_own_material
@@ -167,17 +165,6 @@ def compute_all(plans, progress):
         with naming(name):
             results.append(plan(report))
     return results
-
-
-@contextmanager
-def naming(name):
-    """Add the name of an object to errors."""
-    try:
-        yield
-    except PointCloudError as error:
-        if f'"{name}"' in str(error):
-            raise
-        raise PointCloudError(f'"{name}": {error}') from error
 
 
 def chosen_objects(context, becomes_single):

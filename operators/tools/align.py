@@ -7,6 +7,7 @@ from mathutils import Matrix
 
 from ... import core
 from ...command.alignment import ALIGN, check_found, doubts, middle
+from ...command.naming import naming
 from ...command.quantities import RESIDUAL
 from ...core import PointCloudError
 from ..objects.attributes import tag_changed, write_attribute
@@ -14,7 +15,7 @@ from ..objects.place import check_movable, move_object, moves_with
 from ..objects.reading import TYPES, find_object, obstacle, read_points
 from ..objects.result import length_text
 from ..registration import Registration, Row
-from ..running.application import ShownOperator, Tool, naming
+from ..running.application import ShownOperator, Tool
 from .select import selection
 
 

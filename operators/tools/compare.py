@@ -6,13 +6,14 @@ from bpy.props import BoolProperty, FloatProperty
 
 from ...command.alignment import doubts
 from ...command.comparison import COMPARE, compared, left_out, line
+from ...command.naming import naming
 from ...command.quantities import COMPARED, DEVIATION
 from ..objects.attributes import tag_changed, write_attribute
 from ..objects.place import activate, hide
 from ..objects.reading import obstacle
 from ..objects.result import length_text
 from ..registration import Registration, Row
-from ..running.application import ShownOperator, Tool, naming, operator_reader
+from ..running.application import ShownOperator, Tool, operator_reader
 from .align import ADVICE, Motion, others
 
 

@@ -10,6 +10,7 @@ from bpy_extras import view3d_utils
 
 from ... import core
 from ...command.groups import HANDLE, SOURCE
+from ...command.naming import naming
 from ...core import PointCloudError
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import (
@@ -35,7 +36,7 @@ from ..objects.handlers import notify
 from ..objects.reading import obstacle, sharing_objects
 from ..objects.splats import read_splats
 from ..registration import Registration, Row
-from ..running.application import compute_all, naming, operator_reader
+from ..running.application import compute_all, operator_reader
 from ..running.job import JobOperator
 from ..running.ready import ReadyOperator, reporting
 from ..running.stages import Stages

@@ -8,6 +8,7 @@ import numpy as np
 from bpy.props import BoolProperty, IntProperty
 
 from ...command.analysis import WRITE_LIMIT, continued
+from ...command.naming import naming
 from ...command.quantities import AREA, MEAN_CURVATURE, eigenvector_name
 from ...core import PointCloudError
 from ..objects.all_or_nothing import all_or_nothing
@@ -16,7 +17,6 @@ from ..objects.modifiers import COLLECTION, get_input, is_sequence
 from ..objects.reading import obstacle, read_points, sharing_objects
 from ..objects.result import analysis_names, area_text, check_writable, write_result
 from ..registration import Registration, Row
-from ..running.application import naming
 from ..running.job import JobOperator
 from ..running.ready import reporting
 from .analyze import plan_analysis

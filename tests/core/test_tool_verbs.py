@@ -406,6 +406,13 @@ class TestTransferAttributes:
         code, [line] = run("transfer-attributes", away, "--reference", given)
         assert (code, 'No point of "away" lies within' in line["error"]) == (1, True)
 
+    @pytest.mark.parametrize("verb", ["transfer-attributes", "compare"])
+    def test_errors_of_the_reference_name_it(self, run, tmp_path, verb):
+        plan = write(tmp_path / "plan.ply", SPHERE[:2], heat=SPHERE[:2, 0])
+        inputs = [write(tmp_path / f"{name}.ply", SPHERE) for name in "ab"]
+        code, lines = run(verb, *inputs, "--reference", plan)
+        assert (code, [line["error"].count(str(plan)) for line in lines]) == (1, [1, 1])
+
     def test_colors_go_to_linear_ones_and_back(self):
         given = np.column_stack([np.linspace(0.0, 1.0, 64)[:, None] * [1.0, 0.5, 0.1], np.full(64, 0.3)])
         assert_allclose(colors.srgb(colors.linear(given)), given, atol=1e-7)
