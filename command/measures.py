@@ -117,6 +117,14 @@ def _left_out(laplacian, labels, values):
     return [f"{missing:,} of {count:,} {text}." for text, missing in counts.items() if missing]
 
 
+def measured_line(rows, name, area_text) -> str:
+    """Return how many parts of a cloud of some name are measured, and the area of all, as a text."""
+    components = [row for row in rows if row.name.startswith("Component")]
+    area, off = (sum(getattr(row, name) for row in components) for name in ("area", "area_uncertainty"))
+    parts = f"{len(rows):,} part{'s' if len(rows) > 1 else ''}"
+    return f"{name}: {parts} measured, area {area_text(area)} +- {100.0 * off / area:.2g} %"
+
+
 def check_labels(labels, name: str, where: str):
     """Refuse an attribute that does not hold the numbers of segments, of a file or an object."""
     if labels.dtype.kind not in "iu" or labels.ndim != 1 or not (labels >= 0).any():

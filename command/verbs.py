@@ -9,7 +9,7 @@ from .analysis import WRITE_LIMIT
 from .bending import Deform, SplatInfo
 from .cleaning import STRAYS, THIN_OUT, check_some_stay, stray_line, thin_line, thinner
 from .cloud_verb import CloudVerb, SurfaceVerb, floaters
-from .measures import check_labels, check_numbers, part_table
+from .measures import check_labels, check_numbers, measured_line, part_table
 from .mesh_verb import Mesh
 from .moving_verbs import MinimalSurface, ModeShape, Smooth
 from .quantities import SEGMENT, STRAY, eigenvector_name, written_by
@@ -23,6 +23,7 @@ from .result_verbs import (
     Signature,
     SurfaceVariation,
 )
+from .results import number_text
 from .rows import TABLES, write_rows
 from .settings import LAPLACIAN, Setting, chosen
 from .source_verbs import ExtendDirection, GeodesicDistance, NearestSource, SignedDistance, Simulate, Unwrap
@@ -167,7 +168,8 @@ class Measure(SurfaceVerb):
         rows, notices = part_table(laplacian, labels, values, _volume if own.volume else None, progress)
         if output is not None:
             write_rows(output, [row.record() for row in rows])
-        return {"points": len(cloud.points), "parts": [row.record() for row in rows]}, notices
+        line = measured_line(rows, path.stem, number_text)
+        return {"points": len(cloud.points), "done": line, "parts": [row.record() for row in rows]}, notices
 
 
 def _volume(laplacian, progress):

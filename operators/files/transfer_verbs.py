@@ -4,10 +4,12 @@ from typing import NamedTuple
 
 import bpy
 
+from ..objects.colors import own_colors
 from ..objects.place import place_of
 from ..rigging.transfer import Source
 from ..rigging.transfer_attributes import TransferAttributes
 from ..rigging.transfer_weights import TransferWeights
+from . import objects as files
 from . import opening
 from .tool_verbs import WithReference
 from .verbs import LEFT_OUT
@@ -59,6 +61,13 @@ class AttributesFrom(_TransferFrom):
         super().__init__("transfer_attributes", _AttributesInFile)
         self.help = "colors, numbers, vectors and labels from the surface of the object of another file"
 
+    def save(self, tool, obj, output):
+        arrays, table = files.attribute_arrays(obj), files.point_table(bpy.context, obj)
+        arrays |= {name: table.attributes[name] for name in tool.taken if name in table.attributes}
+        if table.colors is not None and own_colors(obj.data) in tool.taken:
+            arrays["colors"] = table.colors
+        return opening.save(output, obj, arrays, tool.shown)
+
 
 class _FromFile:
     """A tool with a source that is not in the scene, in the coordinates of the files."""
@@ -78,4 +87,8 @@ class _WeightsInFile(_FromFile, TransferWeights):
 
 
 class _AttributesInFile(_FromFile, TransferAttributes):
-    pass
+    taken = ()  # names of attributes
+
+    def write(self, context, obj, result):
+        self.taken = tuple(result.values)
+        return super().write(context, obj, result)

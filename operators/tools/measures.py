@@ -5,7 +5,7 @@ from typing import NamedTuple
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
-from ...command.measures import check_labels, check_numbers, part_table
+from ...command.measures import check_labels, check_numbers, measured_line, part_table
 from ...command.quantities import SEGMENT, written_by
 from ..objects.attributes import read_attribute
 from ..objects.parts import keep_rows
@@ -52,10 +52,7 @@ class MeasureParts(Tool):
 
     def write(self, context, obj, result):
         keep_rows(obj, result.rows, self.measured(obj))
-        components = [row for row in result.rows if row.name.startswith("Component")]
-        area, off = (sum(getattr(row, name) for row in components) for name in ("area", "area_uncertainty"))
-        parts = f"{len(result.rows):,} part{'s' if len(result.rows) > 1 else ''}"
-        return [*result.notices, f"{obj.name}: {parts} measured, area {area_text(area)} +- {100.0 * off / area:.2g} %"]
+        return [*result.notices, measured_line(result.rows, obj.name, area_text)]
 
 
 class MESHFREE_OT_measure_parts(MeasureParts, ApplicationOperator, bpy.types.Operator):

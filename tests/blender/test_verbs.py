@@ -1,5 +1,7 @@
 """Verbs of the command line for meshes, comparison, sides of normals, and what starts at sources."""
 
+import json
+
 import bpy
 import numpy as np
 import pytest
@@ -543,6 +545,72 @@ def test_verbs_without_blender_have_the_settings_of_those_in_it(command):
                 assert theirs.description == setting.description, what
             compared.append(what)
     assert len(compared) > 50
+
+
+ENDS = "--from=0,0,1", "--to=1,0,0"
+SAME = {
+    "analyze": ("--modes", 3),
+    "principal-curvatures": (),
+    "roughness": (),
+    "surface-variation": (),
+    "stray-points": (),
+    "orient": ("--viewpoint", "0,0,0"),
+    "smooth": ("--method", "heat", "--group", "weight"),
+    "mode-shape": ("--mode", 2, "--phase", 60),
+    "minimal-surface": ("--steps", 1, "--group", "low"),
+    "segment": ("--parts", 2),
+    "signature": ("--count", 2, "--modes", 12),
+    "geodesic-distance": ("--at", "0,0,1"),
+    "nearest-source": ("--group", "low"),
+    "signed-distance": ("--curve", "curve.csv"),
+    "unwrap": ("--at", "0,0,1", "--angle", 30),
+    "extend-direction": ("--at", "1,0,0"),
+    "simulate": ("--at", "0,0,1", "--frames", 5),
+    "harmonic-field": ("--low-group", "low", "--high-group", "weight"),
+    "transfer-attributes": ("--reference", "plan.csv"),
+    "compare": ("--reference", "plan.csv"),
+    "section": ("--plane", "0,0,0.2", "--normal", "0,1,1"),
+    "profile": ENDS,
+    "measure": (),
+}
+
+
+@pytest.mark.any_blender
+@pytest.mark.parametrize("verb", SAME)
+def test_a_verb_gives_the_same_in_blender_and_without_it(run, command, tmp_path, monkeypatch, capfd, verb):  # noqa: F811
+    """On points that single precision holds: the record, names and numbers; where signs are free, up to these."""
+    monkeypatch.chdir(tmp_path)
+    points = (sphere_points(600) * [1.0, 0.9, 0.7]).astype(np.float32).astype(np.float64)
+    low, weight = (points[:, 2] < -0.5).astype(int), np.where(points[:, 2] > 0.5, 0.25, 0.0)
+    write(tmp_path / "a.csv", points, low=low, weight=weight)
+    turn = np.linspace(0.0, 4.0, 30)  # three quarters of the equator
+    curve = np.stack([np.cos(turn), 0.9 * np.sin(turn), 0.0 * turn], axis=1)
+    write(tmp_path / "curve.csv", curve)
+    red, green, blue = 0.5 + 0.4 * points.T
+    write(tmp_path / "plan.csv", points, r=red, g=green, b=blue, heat=points[:, 0], part=low)
+    ending = {"section": "csv", "profile": "csv", "measure": "csv"}.get(verb, "npz")
+    given = [verb, "a.csv", *map(str, SAME[verb]), "--out"]
+    code, [inside] = run(*given, f"in.{ending}")
+    assert code == 0, inside
+    outside_verbs = part("command.verbs").make_verbs()
+    assert part("command.main").run([*given, f"out.{ending}"], outside_verbs, "meshfree") == 0
+    [outside] = [json.loads(line) for line in capfd.readouterr().out.splitlines() if line.startswith("{")]
+    assert inside.keys() == outside.keys()
+    figures = {name for name, value in outside.items() if isinstance(value, (int, float))}
+    assert {name: inside[name] for name in figures} == pytest.approx(
+        {name: outside[name] for name in figures}, rel=1e-3, abs=1e-6
+    )
+    if ending == "csv":
+        tables = [np.genfromtxt(f"{name}.csv", delimiter=",", skip_header=1) for name in ("in", "out")]
+        heads = {(tmp_path / f"{name}.csv").read_text().partition("\n")[0] for name in ("in", "out")}
+        assert len(heads) == 1
+        assert_allclose(*tables, rtol=1e-3, atol=1e-4)
+        return
+    found, exact = np.load("in.npz"), np.load("out.npz")
+    assert set(found.files) == set(exact.files)
+    for name in set(found.files) - {"format"}:
+        steps = 0.01 if name == "colors" else 2e-4  # those of colors are bytes in Blender
+        assert_allclose(found[name], exact[name], rtol=1e-3, atol=steps, err_msg=name)
 
 
 def test_meshes_of_points_far_away_stand_where_these_are_exported(run, tmp_path):  # noqa: F811

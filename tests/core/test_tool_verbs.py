@@ -291,6 +291,9 @@ class TestMoving:
         edge = ((SQUARE == 0.0) | (SQUARE == 1.0))[:, :2].any(axis=1)
         assert_array_equal(found["points"][edge], (SQUARE + bump)[edge])
         assert_allclose(found["area_history"][-1], 1.0, atol=5e-3)
+        assert 1 < len(found["area_history"]) <= 8
+        assert run("minimal-surface", source, "--steps", 1, "--out", tmp_path / "a.npz")[0] == 0
+        assert len(np.load(tmp_path / "a.npz")["area_history"]) == 1
 
     def test_a_column_says_what_stays(self, run, tmp_path):
         source = write(tmp_path / "a.ply", SPHERE[::2], Fixed=(SPHERE[::2, 2] > -0.5).astype(int))
@@ -371,7 +374,9 @@ class TestTables:
 
 class TestTransferAttributes:
     def test_numbers_are_averaged_labels_are_not_and_digits_stay(self, run, tmp_path):
-        points, again = SPHERE, random_sphere(500, 4)
+        points, again = np.vstack([SPHERE[::2], SPHERE[1::2] + [40.0, 0.0, 0.0]]), random_sphere(500, 4)
+        shifts = [core.files.choose_origin(cloud + FAR) for cloud in (points, again)]
+        assert (shifts[0] != shifts[1]).any()  # so that both are read with origins of their own
         time = 4e8 + points[:, 2]  # more digits than single precision has
         gray = 0.5 + 0.5 * points[:, 2:]
         tint = np.hstack([gray, gray, gray, np.ones((800, 1))]).astype(np.float32)
