@@ -1,13 +1,14 @@
-"""Animated PNG files of few colors, which browsers play and other programs show as their first frame."""
+"""PNG files of few colors: single pictures, and animations, which other programs show as their first frame."""
 
 import struct
 import zlib
 
 import numpy as np
 
-COLORS = 63  # and one that stands for what stays as it was
+COLORS = 63  # of animations, and one that stands for what stays as it was
 _ROUNDS = 12  # of moving colors of the palette to the middle of those that they stand for
-_BITS = 5  # of each channel that colors are counted by
+_BITS = 5  # of each channel that colors of animations are counted by
+_FINE_BITS = 6  # the same for single pictures
 
 
 def write_loop(path, stills, delay):
@@ -21,9 +22,9 @@ def write_loop(path, stills, delay):
         Milliseconds from one to the next.
     """
     count, height, width, _ = stills.shape
-    palette, index = _quantized(stills)
+    palette, index = _quantized(stills, COLORS, _BITS)
     parts = [
-        _chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 3, 0, 0, 0)),
+        _header(width, height),
         _chunk(b"acTL", struct.pack(">II", count, 0)),
         _chunk(b"PLTE", bytes(3) + palette.tobytes()),
         _chunk(b"tRNS", b"\0"),
@@ -34,13 +35,40 @@ def write_loop(path, stills, delay):
         control = struct.pack(">IIIIIHHBB", number, *shown.shape[::-1], *place[::-1], delay, 1000, 0, 1 if frame else 0)
         parts.append(_chunk(b"fcTL", control))
         number += 1
-        rows = np.concatenate([np.zeros((len(shown), 1), np.uint8), shown], axis=1)  # none of them filtered
-        data = zlib.compress(rows.tobytes(), 9)
+        data = _packed(shown)
         if frame:
             parts.append(_chunk(b"fdAT", struct.pack(">I", number) + data))
             number += 1
         else:
             parts.append(_chunk(b"IDAT", data))
+    _write(path, parts)
+
+
+def write_still(path, picture, colors):
+    """Write a picture in few colors.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+    picture : ndarray, (height, width, 3) uint8
+    colors : int
+        How many, at most 255.
+    """
+    palette, index = _quantized(picture[None], colors, _FINE_BITS)
+    place = _chunk(b"PLTE", bytes(3) + palette.tobytes())
+    _write(path, [_header(*picture.shape[1::-1]), place, _chunk(b"IDAT", _packed(index[0]))])
+
+
+def _header(width, height):
+    return _chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 3, 0, 0, 0))
+
+
+def _packed(index):
+    """Places in the palette, (height, width), as a file holds them: no row is filtered."""
+    return zlib.compress(np.concatenate([np.zeros((len(index), 1), np.uint8), index], axis=1).tobytes(), 9)
+
+
+def _write(path, parts):
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(parts) + _chunk(b"IEND", b""))
 
 
@@ -60,13 +88,13 @@ def _changed(index, frame):
     return np.where(changed, index[frame], 0)[part].astype(np.uint8), (rows[0], columns[0])
 
 
-def _quantized(stills):
+def _quantized(stills, colors, bits):
     """Return a palette, (k, 3) uint8, and for each pixel the place of its color in it, from 1 (k-means)."""
-    codes = (stills >> (8 - _BITS)).astype(np.int64) @ [1 << (2 * _BITS), 1 << _BITS, 1]
+    codes = (stills >> (8 - bits)).astype(np.int64) @ [1 << (2 * bits), 1 << bits, 1]
     _, of_bin, counts = np.unique(codes.ravel(), return_inverse=True, return_counts=True)
     means = np.stack([np.bincount(of_bin, channel) for channel in stills.reshape(-1, 3).T], axis=1) / counts[:, None]
     weights = np.sqrt(counts)  # so that small areas keep their colors
-    palette = means[_apart(means, weights)]
+    palette = means[_apart(means, weights, colors)]
     for _ in range(_ROUNDS):
         nearest = _nearest(means, palette)
         total = np.bincount(nearest, weights, len(palette))
@@ -77,10 +105,10 @@ def _quantized(stills):
     return palette, (1 + nearest[of_bin]).reshape(stills.shape[:3]).astype(np.uint8)
 
 
-def _apart(colors, weights):
-    """Return the rows of colors to begin with: the most frequent one, then each the farthest from those before."""
+def _apart(colors, weights, count):
+    """Return some rows of colors to begin with: the most frequent one, then each the farthest from those before."""
     chosen, away = [int(weights.argmax())], np.full(len(colors), np.inf)
-    while len(chosen) < min(COLORS, len(colors)):
+    while len(chosen) < min(count, len(colors)):
         away = np.minimum(away, np.sum((colors - colors[chosen[-1]]) ** 2, axis=1))
         chosen.append(int((away * weights).argmax()))
     return chosen

@@ -340,11 +340,11 @@ def loop(obj, changes, path, view=VIEW):
         for change in changes:
             change()
             render(scene, still)
-            stills.append(_pixels(still))
+            stills.append(pixels(still))
     animation.write_loop(path, np.array(stills), DELAY)
 
 
-def _pixels(path):
+def pixels(path):
     """Return the pixels of a picture from its top left on, (height, width, 3) uint8."""
     image = bpy.data.images.load(str(path))
     values = np.empty(len(image.pixels), np.float32)

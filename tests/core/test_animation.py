@@ -5,7 +5,7 @@ import zlib
 
 import numpy as np
 
-from animation import write_loop
+from animation import write_loop, write_still
 
 
 def chunks(data):
@@ -73,3 +73,37 @@ def test_many_colors_are_near_those_of_the_palette_and_what_stays_takes_nothing(
     assert np.abs(frames[0].astype(int) - base).mean() < 12.0
     write_loop(tmp_path / "b.png", np.repeat(base[None], 24, axis=0), 80)
     assert (tmp_path / "b.png").stat().st_size < (tmp_path / "a.png").stat().st_size + 24 * 100
+
+
+def still(path):
+    """Decode a single picture, (height, width, 3)."""
+    found = dict(chunks(path.read_bytes()))
+    assert list(found) == [b"IHDR", b"PLTE", b"IDAT", b"IEND"]
+    width, height, *how = struct.unpack(">IIBBBBB", found[b"IHDR"])
+    assert how == [8, 3, 0, 0, 0]
+    palette = np.frombuffer(found[b"PLTE"], np.uint8).reshape(-1, 3)
+    rows = np.frombuffer(zlib.decompress(found[b"IDAT"]), np.uint8).reshape(height, width + 1)
+    assert not rows[:, 0].any()
+    return palette[rows[:, 1:]], len(palette)
+
+
+def test_a_picture_of_few_colors_is_kept_as_it_is(tmp_path):
+    rng = np.random.default_rng(0)
+    colors = np.unique(rng.integers(64, size=(200, 3)) * 4, axis=0).astype(np.uint8)
+    picture = colors[rng.integers(len(colors), size=(30, 40))]
+    write_still(tmp_path / "still.png", picture, 255)
+    shown, _ = still(tmp_path / "still.png")
+    np.testing.assert_array_equal(shown, picture)
+
+
+def test_a_picture_of_many_colors_gets_the_nearest_of_few(tmp_path):
+    x, y = np.meshgrid(np.linspace(0.0, 255.0, 64), np.linspace(0.0, 255.0, 64))
+    picture = np.stack([x, y, 0.5 * (x + y)], axis=-1).astype(np.uint8)
+    errors = []
+    for colors in (16, 64, 255):
+        write_still(tmp_path / "still.png", picture, colors)
+        shown, found = still(tmp_path / "still.png")
+        assert found <= colors + 1
+        errors.append(np.sqrt(np.mean((shown.astype(float) - picture) ** 2)))
+    # On a plane of colors, as the cells of a grid of 255 / sqrt(count): halving these halves the error.
+    np.testing.assert_allclose(np.divide(errors[0], errors[1:]), [2.0, 4.0], rtol=0.3)
