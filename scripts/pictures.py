@@ -18,6 +18,7 @@ import demo
 import follow_pictures
 import package
 import paper_pictures
+import release_pictures
 import rig_pictures
 import scan_pictures
 import studio
@@ -497,6 +498,7 @@ PICTURES = {
     "motion_front": motion("FRONT", 70, width=0.4),
     **follow_pictures.PICTURES,
     **paper_pictures.PICTURES,
+    **release_pictures.PICTURES,
     **rig_pictures.PICTURES,
     **scan_pictures.PICTURES,
     **transfer_pictures.PICTURES,
