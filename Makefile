@@ -8,7 +8,7 @@ BOOT := $(shell for python in "$(PYTHON)" python3.11 python3.13 python3 python "
 	"$$python" -c "import sys; sys.exit(sys.version_info < (3, 8))" >/dev/null 2>&1 && echo "$$python" && break; done)
 run = $(if $(BOOT),"$(BOOT)",$(error No Python is found: install Python 3.11 or 3.13, or name it by PYTHON=...)) -B scripts/
 
-.PHONY: help demo test test-all test-gui build wheel validate audit lint benchmark index pictures clean
+.PHONY: help demo test test-all test-gui build wheel validate audit lint benchmark index pictures release publish clean
 
 help: ## Show this list (default)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-12s%s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -50,6 +50,12 @@ index: ## Renew the table of operators in docs/manual.md from the registered too
 
 pictures: ## Render the pictures of the manual, or some: ARGUMENTS="smooth rim"; those of scans from MESHFREE_SCANS=folder
 	@$(run)in_blender.py pictures.py $(ARGUMENTS)
+
+release: ## Check, test and build a release into dist/: VERSION=1.2.3 [PAGE=address] [UNTESTED="why no test was run"]
+	@$(run)release.py "$(VERSION)" $(if $(PAGE),--page "$(PAGE)") $(if $(UNTESTED),--untested "$(UNTESTED)")
+
+publish: ## Upload a release in dist/ to Blender's extensions platform: VERSION=1.2.3 [PLATFORMS="linux-x64 ..."]
+	@$(run)publish.py "$(VERSION)" $(PLATFORMS)
 
 clean: ## Remove everything that was made, the environments too
 	rm -rf .venv build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -38,10 +38,10 @@ def this_platform():
     return name
 
 
-def archive(name):
+def archive(name, folder=OUTPUT):
     """Path of the zip for a platform."""
     manifest = read_manifest()
-    return OUTPUT / f"{manifest['id']}-{manifest['version']}-{name.replace('-', '_')}.zip"
+    return folder / f"{manifest['id']}-{manifest['version']}-{name.replace('-', '_')}.zip"
 
 
 def wheel_names(name):
@@ -112,8 +112,8 @@ def tool(python, *arguments):
     run([python, script, *arguments], timeout=300, capture_output=True, text=True)
 
 
-def build(platforms):
-    """Build the zips of some platforms into dist/ and return their paths."""
+def build(platforms, output=OUTPUT):
+    """Build the zips of some platforms into a folder, dist/ unless another is named, and return their paths."""
     python = newest_blender()
     for name in platforms:
         fetch(wheel_names(name), python)
@@ -122,14 +122,20 @@ def build(platforms):
     shutil.rmtree(packed, ignore_errors=True)
     packed.mkdir()
     tool(python, "build", "--split-platforms", "--source-dir", STAGE, "--output-dir", packed)
-    OUTPUT.mkdir(exist_ok=True)
-    paths = [archive(name) for name in platforms]
+    output.mkdir(parents=True, exist_ok=True)
+    paths = [archive(name, output) for name in platforms]
     for path in paths:
         shutil.move(packed / path.name, path)
         print(f"{path.relative_to(ROOT)}: {path.stat().st_size / 1e6:.1f} MB")
     shutil.rmtree(packed)
     shutil.rmtree(STAGE)
     return paths
+
+
+def validate(path):
+    """Let Blender's own tool judge a zip, and stop if it is not valid."""
+    tool(newest_blender(), "validate", path)
+    print(f"{path.relative_to(ROOT)}: valid")
 
 
 def main():
@@ -139,8 +145,7 @@ def main():
     arguments = parser.parse_args()
     for path in build(read_manifest()["platforms"]):
         if arguments.validate:
-            tool(newest_blender(), "validate", path)
-            print(f"{path.relative_to(ROOT)}: valid")
+            validate(path)
 
 
 if __name__ == "__main__":
