@@ -15,14 +15,25 @@ CLOUDS = (Path(__file__).parents[1] / "blender" / "clouds.py").read_text(encodin
 
 
 @pytest.fixture(scope="session")
-def window():
-    """One Blender for all tests."""
+def place():
+    """Where a Blender with a window is."""
     try:
-        place = gui_blender.find()
+        return gui_blender.find()
     except gui_blender.LeftOutError as error:
         pytest.skip(str(error))
-    archive = package.archive(package.this_platform())
-    assert archive.exists(), f"{archive.name} is missing in dist/, `make build` makes it"
+
+
+@pytest.fixture(scope="session")
+def archive():
+    """Zip of this machine's platform."""
+    path = package.archive(package.this_platform())
+    assert path.exists(), f"{path.name} is missing in dist/, `make build` makes it"
+    return path
+
+
+@pytest.fixture(scope="session")
+def window(place, archive):
+    """One Blender for all tests."""
     with Window(place, archive) as window:
         yield window
 
