@@ -1,6 +1,7 @@
 """Uploads to the extensions platform, to a double of it on this machine."""
 
 import email
+import re
 import threading
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
@@ -117,3 +118,19 @@ def test_a_token_is_needed(monkeypatch):
     monkeypatch.setattr("sys.argv", ["publish.py", "1.2.3"])
     with pytest.raises(SystemExit, match=publish.TOKEN):
         publish.main()
+
+
+def test_the_workflow_calls_what_there_is():
+    workflow = (package.ROOT / ".github" / "workflows" / "release.yml").read_text(encoding="utf-8")
+    makefile = (package.ROOT / "Makefile").read_text(encoding="utf-8")
+    page = (package.ROOT / "docs" / "releasing.md").read_text(encoding="utf-8")
+    targets = re.findall(r"\bmake ([a-z]+)", workflow)
+    assert set(targets) >= {"lint", "release", "publish"}
+    for target in targets:
+        assert re.search(rf"^{target}:", makefile, re.MULTILINE), target
+    scripts = re.findall(r"scripts/\w+\.py", workflow)
+    assert scripts
+    assert all((package.ROOT / script).is_file() for script in scripts)
+    assert f"{publish.TOKEN}: ${{{{ secrets.{publish.TOKEN} }}}}" in workflow
+    for name in (publish.TOKEN, *re.findall(r"environment: ([\w-]+)", workflow)):
+        assert f"`{name}`" in page
