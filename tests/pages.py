@@ -13,6 +13,7 @@ _SHELL = r"(?:[A-Z_]+=\S+ )*(make|blender|python|pip|meshfree|openjd|bash) \S.*"
 _TYPED = re.compile(rf"{_SHELL}|bpy\.ops\.\w+\..*")
 
 FARM = "needs a scheduler; tests/wheel/test_farm.py runs it on other files"
+SERVER = "needs a server; tests/gui/test_repository.py runs it with one"
 SLOW = "takes minutes to hours; test_pages.py of the core looks for the module"
 NOT_RUN = {
     "blender --command meshfree analyze IN [IN ...] --out FILE | --out-dir DIR [--modes N] [--format FORMAT]": "a form",
@@ -22,6 +23,9 @@ NOT_RUN = {
     "blender --background --command meshfree": "a form",
     "openjd run farm/openjd/template.yaml -p InputDir=/data/scans -p OutputDir=/data/out -p Parts=40": FARM,
     "bash farm/slurm/meshfree.sh 40 analyze /data/scans /data/out --modes 10": FARM,
+    "blender --online-mode --command extension repo-add --name Studio --url https://server/index.json studio": SERVER,
+    "blender --online-mode --command extension install --sync --enable studio.meshfree_laplacian": SERVER,
+    "blender --online-mode --command extension update --sync": SERVER,
     "pip install laspy lazrs": "changes the environment, from the internet",
     "pip install open3d==0.19.0": "changes the environment, from the internet",
     "pip install open3d==0.20.0": "changes the environment, from the internet",
