@@ -13,6 +13,13 @@ from window import Window
 
 CLOUDS = (Path(__file__).parents[1] / "blender" / "clouds.py").read_text(encoding="utf-8")  # run inside Blender
 
+# Most of the time would go by with smooth edges and lines, drawn again and again without a graphics card.
+PLAIN = """
+system = bpy.context.preferences.system
+system.viewport_aa = "OFF"
+system.use_overlay_smooth_wire = system.use_edit_mode_smooth_wire = False
+"""
+
 
 @pytest.fixture(scope="session")
 def place():
@@ -44,9 +51,9 @@ def gui(window, request):
     if not window.running:  # it went down in the test before
         window.close()
         window.open()
-    # Most of the time would go by with smooth edges, drawn again and again without a graphics card.
-    window.python("bpy.context.preferences.system.viewport_aa = 'OFF'")
+    window.python(PLAIN)
     window.new_file()
+    window.python("view3d()[0].spaces.active.overlay.show_floor = False")
     window.python(CLOUDS)
     known = len(window.complaints)
     yield window
