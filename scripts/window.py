@@ -220,7 +220,7 @@ class Window:
 
     def type(self, text):
         """Type a text."""
-        self._xdotool("type", "--delay", "30", text)
+        self._xdotool("type", "--delay", "10", text)
 
     def move(self, x, y):
         """Move the mouse."""

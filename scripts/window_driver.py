@@ -14,7 +14,7 @@ import traceback
 import bpy
 import numpy as np
 
-TICK = 0.01  # seconds
+TICK = 0.002  # seconds; waiting Blender looks every five milliseconds
 _requests, _answers = (int(word) for word in os.environ["MESHFREE_PIPES"].split())
 _buffer = b""
 
