@@ -14,18 +14,31 @@ from .cloud import (
     fit_surface,
     gather,
     measure_noise,
+    measure_surface,
     read_cloud,
     read_surface,
     remove_noise,
     surface_discs,
+    with_scatter,
 )
-from .components import find_gaps, gap_reach, move_apart, number_by_size, number_large
+from .components import find_gaps, gap_reach, move_apart, number_sizes
 from .distances import arc_length, arc_squared, circle_arc, dots, pair_heights
 from .doubt import Doubt
 from .moments import LARGEST, MET, TERMS, EdgeTerms, put_terms
-from .nearest import COUNT, ON, ROUNDS, SMOOTH, fading_weights, find_nearest, nearest_rows, typical_distance
+from .nearest import (
+    COUNT,
+    FEW,
+    ON,
+    ROUNDS,
+    SMOOTH,
+    fading_weights,
+    find_nearest,
+    nearest_rows,
+    spacing_of,
+    typical_distance,
+)
 from .noise import FILLING, near_misfit
-from .normals import mirrored_cosine, near_edges, outer_signs, unit_normals
+from .normals import mirrored_cosine, near_edges, side_sums, signs_by_sums, unit_normals
 from .orientation import orient_normals, toward
 from .pairs import Pairs, find_pairs
 from .patches import Patch
@@ -33,7 +46,7 @@ from .points import FEWEST, ScaledPoints, as_indices, as_mask, check_points, che
 from .prolongation import Prolongation, balanced_weights
 from .quadrics import CURVED, MANY, check_surface, frames, roundness
 from .rows import look_across_rows
-from .sheets import choose_bridges, join_touching, number_sheets, same_sheet, sheet_neighbors
+from .sheets import choose_bridges, join_touching, same_sheet, sheet_neighbors
 from .strays import PARTS, label_parts, stray_scores, without
 from .subset import FINEST, blue_noise_subset, independent, mix_bits
 from .thinning import nearest_in_blocks, thin

@@ -187,11 +187,43 @@ def read_cloud(
     if not len(kept):
         raise TooFewPointsError(f"All {len(points)} points are named to be left out. Name fewer.")
     scaled, surface = read_surface(points, options, report, kept, agreed)
+    given = None if normals is None else unit_normals(normals, len(points))[surface.sample.scaled.first]
+    counts = len(kept), len(scaled.points)
+    return measure_surface(surface, options, counts, given, boundary, boundary_distance, report)
+
+
+def measure_surface(
+    surface: Surface,
+    options: LaplacianOptions,
+    counts: tuple[int, int],
+    given: Floats | None = None,
+    boundary: ArrayLike | None = None,
+    boundary_distance: ArrayLike | None = None,
+    report: Progress = lambda stage, fraction: None,
+) -> Cloud:
+    """Go from quadrics to pairs.
+
+    Parameters
+    ----------
+    surface : Surface
+        Of m points.
+    options : LaplacianOptions
+        Settings.
+    counts : tuple of int
+        How many points there were at first, and how many distinct ones among them, for the notices.
+    given : ndarray, (m, 3), optional
+        Unit normals to use as they are.
+    boundary, boundary_distance, report
+        See `build_laplacian`.
+
+    Returns
+    -------
+    Cloud
+    """
     sample, quadrics, nearest = surface.sample, surface.quadrics, surface.sample.nearest
     decisions = sample.decisions
 
     report("Normals", 0.18)
-    given = None if normals is None else unit_normals(normals, len(points))[sample.scaled.first]
     own = quadrics.normals if given is None else given
     oriented = decisions.sides(
         sample.scaled, own, lambda: orient_by_winding(nearest, own, sample.places, sample.component)
@@ -241,9 +273,9 @@ def read_cloud(
         pairs=pairs,
         decisions=decisions,
         notices=_notices(
-            duplicates=len(kept) - len(scaled.points),
-            left_out=len(scaled.points) - len(own),
-            share=1.0 - len(own) / len(scaled.points),
+            duplicates=counts[0] - counts[1],
+            left_out=counts[1] - len(own),
+            share=1.0 - len(own) / counts[1],
             noise=sample.noise,
             narrow=bool(np.mean(lengths > _NARROW * depth(nearest, edge.distance)) > MANY),
         ),
@@ -278,9 +310,7 @@ def read_surface(
     report("Normals", 0.06)
     sample = divide_components(sample, needed)
     report("Normals", 0.1)
-    surface = fit_surface(sample, options.sheets)
-    scatter = mean_misfits(surface.sample.nearest, surface.mixed.misfit, surface.quadrics.misfit)
-    surface = replace(surface, sample=replace(surface.sample, scatter=scatter))
+    surface = with_scatter(fit_surface(sample, options.sheets))
     report("Normals", 0.12)
     surface = remove_noise(surface, options)
     report("Normals", 0.16)
@@ -374,10 +404,17 @@ def fit_surface(sample: Sample, sheets: bool, before: Surface | None = None, cha
     return Surface(replace(sample, nearest=fitted.nearest), fitted.quadrics, fitted)
 
 
-def remove_noise(surface: Surface, options: LaplacianOptions) -> Surface:
+def with_scatter(surface: Surface) -> Surface:
+    """Return the same surface, with what quadrics miss the neighbours of each point by before noise is smoothed."""
+    scatter = mean_misfits(surface.sample.nearest, surface.mixed.misfit, surface.quadrics.misfit)
+    return replace(surface, sample=replace(surface.sample, scatter=scatter))
+
+
+def remove_noise(surface: Surface, options: LaplacianOptions, near: Floats | None = None) -> Surface:
     """Move points onto the surface that their neighbours describe, where the options or the noise ask for it.
 
-    Each round measures again only points that the last one moved, and their neighbours.
+    Each round measures again only points that the last one moved, and their neighbours. The first one takes
+    `near_misfit`, (m,), if that is known.
 
     Returns
     -------
@@ -386,7 +423,7 @@ def remove_noise(surface: Surface, options: LaplacianOptions) -> Surface:
     """
     if options.projection == "off":
         return surface
-    near = near_misfit(surface.sample.nearest)
+    near = near_misfit(surface.sample.nearest) if near is None else near.copy()
     noise = measure_noise(surface, near)
     if options.projection != "auto":
         return _project(surface, noise, np.ones(len(noise), dtype=bool))[0]

@@ -78,10 +78,15 @@ def label_connected(index: Ints, joined: Bools) -> Ints:
 def number_by_size(label: Ints, smallest: int) -> Ints:
     """Number labels by how many points have them, the most frequent 0; rarer ones than the smallest size are -1."""
     _, label, size = np.unique(label, return_inverse=True, return_counts=True)
+    return number_sizes(size, smallest)[label]
+
+
+def number_sizes(size: Ints, smallest: int) -> Ints:
+    """Number sizes, (k,) int, the greatest 0; those below the smallest one are -1, but for the greatest."""
     order = np.argsort(-size, kind="stable")
     number = np.empty_like(order)
     number[order] = np.where((size[order] >= smallest) | (np.arange(len(order)) == 0), np.arange(len(order)), -1)
-    return number[label]
+    return number
 
 
 def move_apart(points: Floats, component: Ints) -> Floats:

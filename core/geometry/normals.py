@@ -85,11 +85,32 @@ def outer_signs(points: Floats, normals: Floats, part: Ints, weight: Floats | No
 
     size = total(1.0) + np.finfo(float).tiny
     center = np.column_stack([total(points[:, axis]) for axis in range(3)]) / size[:, None]
-    offset = points - center[part]
-    outward = total(np.einsum("ij,ij->i", offset, normals))
-    upward = total(normals[:, 2])
-    distance = np.sqrt(size * total(np.einsum("ij,ij->i", offset, offset)))
-    sheet = (np.abs(outward) < _BULGING * distance) & (np.abs(upward) > _UPRIGHT * total(np.abs(normals[:, 2])))
+    return signs_by_sums(side_sums(points - center[part], normals, part, weight))
+
+
+def side_sums(offset: Floats, normals: Floats, part: Ints, weight: Floats) -> Floats:
+    """Return the sums over each part by which its outer side is known, (parts, 10); those of divided parts add up.
+
+    Parameters
+    ----------
+    offset, normals : ndarray, (m, 3)
+        Offsets from any place, which is best near the center of the part.
+    part : ndarray, (m,) int
+    weight : ndarray, (m,)
+    """
+    height, square = np.einsum("ij,ij->i", offset, normals), np.einsum("ij,ij->i", offset, offset)
+    values = np.column_stack([np.ones(len(part)), offset, normals, height, square, np.abs(normals[:, 2])])
+    return np.column_stack([np.bincount(part, weight * column) for column in values.T])
+
+
+def signs_by_sums(sums: Floats) -> Floats:
+    """Return the signs of parts, (parts,), by their `side_sums`: see `outer_signs`."""
+    size, first, normal = sums[:, 0] + np.finfo(float).tiny, sums[:, 1:4], sums[:, 4:7]
+    outward = sums[:, 7] - np.einsum("ij,ij->i", first, normal) / size
+    upward = normal[:, 2]
+    spread = sums[:, 8] - np.einsum("ij,ij->i", first, first) / size
+    distance = np.sqrt(size * np.maximum(spread, 0.0))
+    sheet = (np.abs(outward) < _BULGING * distance) & (np.abs(upward) > _UPRIGHT * sums[:, 9])
     return np.where(np.where(sheet, upward, outward) < 0.0, -1.0, 1.0)
 
 

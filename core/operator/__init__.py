@@ -4,6 +4,6 @@ from .areas import KernelMatrix, estimate_areas, solve_areas
 from .connection import connection_laplacian, tangent_frames
 from .curvature import PrincipalCurvatures, mean_curvature, principal_curvatures
 from .implicit import Heights, ImplicitSurface
-from .laplacian import LaplaceBeltrami, build_laplacian, laplacian_of, narrow_laplacian
+from .laplacian import LaplaceBeltrami, assemble_laplacian, build_laplacian, laplacian_of, narrow_laplacian
 from .spectrum import Spectrum, symmetric_form
 from .stiffness import Stiffness, stiffness_matrix

@@ -15,7 +15,7 @@ from ..geometry import Agreed, Doubt, arc_length, check_points, check_values, mo
 from ..kernel import SECOND_MOMENT
 from ..memory import check_memory
 from ..options import LaplacianOptions, check_options
-from ..types import Bools, Floats, Ints, Progress
+from ..types import Bools, Floats, Ints, Progress, Report
 from .areas import NO_AREA, solve_areas
 from .spectrum import TOLERANCE, Spectrum, correct_eigenvalues, solve_spectrum
 from .stiffness import Stiffness, assemble_stiffness
@@ -395,8 +395,29 @@ def build_laplacian(
 
     report("Operator", 0.8)
     cloud = replace(cloud, pairs=replace(cloud.pairs, distance=distance))  # frees the memory of distances in space
-    stiffness = assemble_stiffness(cloud, distance, areas, lambda: report("Operator", 0.8))
-    return laplacian_of(checked, cloud, areas, stiffness, options)
+    return assemble_laplacian(checked, cloud, areas, options, lambda: report("Operator", 0.8))
+
+
+def assemble_laplacian(
+    points: Floats, cloud: Cloud, areas: Floats, options: LaplacianOptions, report: Report = lambda: None
+) -> LaplaceBeltrami:
+    """Assemble the operator from what it consists of.
+
+    Parameters
+    ----------
+    points : ndarray, (n, 3)
+        The caller's [L].
+    cloud : Cloud
+        Of m distinct points, with the distances of pairs along the surface.
+    areas : ndarray, (m,)
+        From `solve_areas`.
+    options : LaplacianOptions
+        The settings they were built with.
+    report : callable
+        Called now and then; may raise `Cancelled`.
+    """
+    stiffness = assemble_stiffness(cloud, cloud.pairs.distance, areas, report)
+    return laplacian_of(points, cloud, areas, stiffness, options)
 
 
 def laplacian_of(

@@ -1,5 +1,8 @@
 """A cloud in tiles: cut with halos, surveyed for what all must agree on, and measured one by one as within it."""
 
 from .cut import HALO, Tile, cut
+from .cutting import cut_to_store, points_of_tile
 from .measure import Measured, measure_tile
+from .run import pending, run_steps, settle, visit_tile
+from .store import Store
 from .survey import survey

@@ -2,45 +2,118 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
 
-from ..types import Floats, Ints
+from ..types import Array, Floats, Ints
+
+if TYPE_CHECKING:
+    from .shelf import Record, Shelf, Told
+    from .site import Site
 
 
-def merge_links(links: Iterable[tuple[Ints, Ints, Ints]], count: int) -> Ints:
-    """Number what links join, within and across tiles.
+def label_links(site: Site, scaled: Any, first: Ints, second: Ints) -> Told:
+    """Number what links from points in the box of a tile join, within it.
 
     Parameters
     ----------
-    links : iterable of (rows, first, second)
-        Of each tile the rows, (k,) int, of its points in the cloud, and the links from points in its box, by their
-        places among these.
-    count : int
-        Points of the cloud.
+    site : Site
+    scaled : ScaledPoints
+        The m distinct points.
+    first, second : ndarray, (k,) int
+        Links, from points in the box to others.
 
     Returns
     -------
-    ndarray, (count,) int
-        A label of each point; -1 for those that are in no tile.
+    dict
+        The label of each point in the box, and how many distinct ones have each; of the points outside that links
+        reach the tile that they belong to, their places in it, and their labels here.
     """
-    label, offset = np.full(count, -1), 0
-    edges: list[Ints] = []
-    for rows, first, second in links:
-        graph = sparse.csr_array((np.ones(len(first), dtype=bool), (first, second)), shape=(len(rows),) * 2)
-        number, part = connected_components(graph, directed=False)
-        part = part + offset
-        offset += number
-        known = label[rows] >= 0
-        edges.append(np.unique(np.stack([label[rows[known]], part[known]]), axis=1))
-        label[rows[~known]] = part[~known]
+    part, count, inner = site.part, len(scaled.points), site.inner(scaled)
+    graph = sparse.csr_array((np.ones(len(first), dtype=bool), (first, second)), shape=(count, count))
+    label = connected_components(graph, directed=False)[1]
+    reached = np.zeros(count, dtype=bool)
+    reached[second] = True
+    reached &= ~inner
+    used = inner | reached
+    names, number = np.unique(label[used], return_inverse=True)
+    label = np.full(count, -1)
+    label[used] = number.reshape(-1)
+    rows = scaled.first[reached]
+    return {
+        "label": site.own(scaled, label, -1),
+        "size": np.bincount(label[inner], minlength=len(names)),
+        "owner": part.owner[rows],
+        "place": part.place[rows],
+        "reached": label[reached],
+    }
+
+
+class Merged(NamedTuple):
+    """Labels of all tiles, merged.
+
+    Attributes
+    ----------
+    start : ndarray, (tiles + 1,) int
+        Where the labels of each tile begin among those of all.
+    label : ndarray, (labels,) int
+        The merged label of each label of each tile.
+    size : ndarray, (merged,) int
+        How many distinct points have each merged one.
+    """
+
+    start: Ints
+    label: Ints
+    size: Ints
+
+
+def merge_labels(shelf: Shelf, step: str) -> Merged:
+    """Merge the labels that `label_links` gave in a step, over the points that links reach in other tiles."""
+    alive = [number for number in shelf.alive if shelf.done(step, number)]
+    counts = np.zeros(max(alive) + 2, dtype=np.int64)
+    sizes = [shelf.read(step, number, "size") for number in alive]
+    counts[np.array(alive) + 1] = [len(size) for size in sizes]
+    start = np.cumsum(counts)
+    edges: list[Ints] = [np.zeros((2, 0), dtype=np.int64)]
+    for number in alive:
+        owner, place, reached = (shelf.read(step, number, name) for name in ("owner", "place", "reached"))
+        for other in np.unique(owner):
+            if shelf.done(step, int(other)):
+                rows = owner == other
+                known = shelf.read(step, int(other), "label")[place[rows]]
+                pairs = np.stack([start[other] + known, start[number] + reached[rows]])[:, known >= 0]
+                edges.append(np.unique(pairs, axis=1))
     first, second = np.concatenate(edges, axis=1)
-    graph = sparse.csr_array((np.ones(len(first), dtype=bool), (first, second)), shape=(offset, offset))
-    merged = connected_components(graph, directed=False)[1]
-    return np.where(label >= 0, merged[label], -1)
+    graph = sparse.csr_array((np.ones(len(first), dtype=bool), (first, second)), shape=(start[-1], start[-1]))
+    label = connected_components(graph, directed=False)[1]
+    return Merged(start, label, np.bincount(label, np.concatenate(sizes)).astype(np.int64))
+
+
+def names_of(step: str, name: str, start: Ints, values: Array) -> Record:
+    """Return the record of what is agreed on, under a name, for the labels that a step has given in each tile."""
+    return {name: values, f"{step} start": start}
+
+
+def named(record: Record, step: str, name: str, owner: Ints, label: Ints, neutral: Any) -> Array:
+    """Return what is agreed on, under a name, for labels that a step has given in some tiles; those below 0 have none.
+
+    Parameters
+    ----------
+    record : dict
+        With `names_of` that step.
+    step, name : str
+    owner, label : ndarray, (k,) int
+    neutral
+        For those without a label.
+    """
+    values, start = record[name], record[f"{step} start"]
+    result = np.full(len(label), neutral, values.dtype)
+    rows = np.flatnonzero(label >= 0)
+    result[rows] = values[start[owner[rows]] + label[rows]]
+    return result
 
 
 def agree_on_signs(first: Ints, second: Ints, votes: Floats, count: int) -> Floats:

@@ -9,10 +9,11 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from ..geometry import Agreed
-from ..operator import build_laplacian, mean_curvature
+from ..operator import build_laplacian
 from ..options import LaplacianOptions
 from ..types import Bools, Floats, Ints, Progress
 from .cut import Tile
+from .measures import results
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +24,8 @@ class Measured:
     ----------
     rows : ndarray, (k,) int
         Which of the cloud's points.
-    normals, areas, smoothing_lengths, quadric_mean_curvature, gaussian_curvature, boundary, trust, doubt
+    normals, areas, smoothing_lengths, quadric_mean_curvature, gaussian_curvature, boundary, trust, doubt,
+    surface_points
         As of `LaplaceBeltrami`.
     mean_curvature : ndarray, (k,)
         By the operator, see `core.mean_curvature`.
@@ -46,6 +48,7 @@ class Measured:
     boundary: Bools
     trust: Floats
     doubt: Ints
+    surface_points: Floats
     stiffness: sparse.csr_array
     notices: list[str]
 
@@ -96,22 +99,11 @@ def measure_tile(
     count, inner = len(points), np.flatnonzero(tile.inner)
     part = build_laplacian(points[tile.rows], options=options, agreed=agreed.among(tile.rows, count), progress=progress)
     label = agreed.component if agreed.sheet is None else agreed.sheet
-    component = part.component[inner]
-    if label is not None:
-        component = np.where(component < 0, -1, label[tile.rows[inner]])
     rows = part.stiffness[inner]
+    found = results(part, None if label is None else label[tile.rows], inner)
     return Measured(
         rows=tile.rows[inner],
-        normals=part.normals[inner],
-        areas=part.areas[inner],
-        smoothing_lengths=part.smoothing_lengths[inner],
-        quadric_mean_curvature=part.quadric_mean_curvature[inner],
-        gaussian_curvature=part.gaussian_curvature[inner],
-        mean_curvature=mean_curvature(part)[inner],
-        component=component,
-        boundary=part.boundary[inner],
-        trust=part.trust[inner],
-        doubt=part.doubt[inner],
+        **found,
         stiffness=sparse.csr_array((rows.data, tile.rows[rows.indices], rows.indptr), shape=(len(inner), count)),
         notices=part.notices,
     )

@@ -11,7 +11,7 @@ import core
 from core.geometry import Agreed, find_nearest
 from core.geometry.boundary import no_boundary
 from core.geometry.moments import least_error
-from core.tiles.labels import agree_on_signs, merge_links
+from core.tiles.labels import agree_on_signs
 
 COUNT = 4000
 LENGTH, RADIUS = 12.0, 0.125  # of rods so long that tiles with halos are two thirds of them
@@ -178,16 +178,6 @@ def test_errors_of_moments_do_not_depend_on_which_points_are_asked_together():
 
 
 class TestLabels:
-    def test_of_links_are_merged_over_common_points(self):
-        # A chain 0 - 1 - 2 - 3 over two tiles, 4 - 5 in the second, 6 alone.
-        first = np.array([0, 1, 2]), np.array([0, 1]), np.array([1, 2])
-        second = np.array([2, 3, 4, 5, 6]), np.array([0, 2]), np.array([1, 3])
-        label = merge_links([first, second], 8)
-        assert len(set(label[:4])) == 1
-        assert label[4] == label[5]
-        assert len({label[0], label[4], label[6]}) == 3
-        assert label[7] == -1
-
     def test_of_signs_follow_most_votes(self):
         # A chain of three patches, the second reversed; one false vote between the ends, and a patch alone.
         sign = agree_on_signs(np.array([0, 1, 0, 1]), np.array([1, 2, 2, 0]), np.array([-4.0, -7.0, -1.0, -5.0]), 4)

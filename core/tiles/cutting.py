@@ -1,0 +1,313 @@
+"""A cloud larger than memory cut into the files of a store, in two passes over its points."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..errors import InvalidPointsError, NotEnoughMemoryError, PointCloudError, TooFewPointsError
+from ..geometry import FEW, check_points, spacing_of
+from ..memory import needed_memory
+from ..options import LaplacianOptions
+from ..types import Array, Floats, Ints
+from .cut import HALO
+from .shelf import Record, Told
+from .site import Site
+from .steps import Step
+from .store import COLUMNS, POINTS, Store, write_manifest
+from .survey import DEGREE
+
+Chunks: TypeAlias = Iterable[tuple[Floats, dict[str, Array]]]  # coordinates, and what is told of the points besides
+
+_SAMPLE = 1 << 20  # points by whose medians the cloud is cut, at least half of them
+_PLACE = "coordinates of the point"  # in rows, beside columns of any names
+_NARROWEST = 3.0  # halos that a tile is wide at least: below, most of the work is in the halos
+
+
+def cut_to_store(
+    chunks: Callable[[], Chunks],
+    folder: str | os.PathLike[str],
+    most: int,
+    options: LaplacianOptions = LaplacianOptions(),
+    *,
+    halo: float = HALO,
+    degree: int = DEGREE,
+    memory: int | None = None,
+    known: dict[str, Any] | None = None,
+) -> Store:
+    """Cut a cloud that need not fit the memory into tiles on disk.
+
+    Parameters
+    ----------
+    chunks : callable
+        Returns an iterable of coordinates, (k, 3) [L], and of other columns by name, (k,) or (k, m);
+        the same each time.
+    folder : path-like
+        Of the store; it must not exist, and appears when all is written.
+    most : int
+        Points that a tile has about, at most.
+    options : LaplacianOptions
+        Settings.
+    halo : float
+        See `cut`.
+    degree : int
+        See `survey`.
+    memory : int, optional
+        Bytes that a tile may take: larger ones are left out, with an error.
+    known : dict, optional
+        What else the manifest is to tell, such as the sources.
+
+    Returns
+    -------
+    Store
+
+    Raises
+    ------
+    PointCloudError
+        The folder exists, or cannot be written; or there are no points, or chunks that differ when read again.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import core
+    >>> points = core.example_sphere()
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     store = core.tiles.cut_to_store(lambda: [(points, {})], folder + "/store", 200)
+    ...     print([len(store.own(number)) for number in range(store.count)])
+    [200, 200, 200, 200]
+    """
+    folder = Path(folder)
+    if folder.exists():
+        raise PointCloudError(f"{folder} exists. Go on with it, or choose another folder.")
+    if most < 1:
+        raise InvalidPointsError(f"Tiles of {most} points were asked for. Ask for at least one.")
+    counted = _count(chunks())
+    plan = _Plan(counted.sample, -(-counted.count // most))
+    building = folder.with_name(f".{folder.name}.part")
+    try:
+        shutil.rmtree(building, ignore_errors=True)  # of a cut that was killed
+        building.mkdir(parents=True)
+        sizes = _spread(chunks(), building, plan, counted)
+        agreed = {"center": counted.center, "scale": counted.scale, "degree": degree}
+        left_out = {"columns left out": counted.left_out, "halo": halo, "memory": memory}
+        write_manifest(building, options, sizes, agreed, {**(known or {}), **left_out, "points": counted.count})
+        os.replace(building, folder)
+    except OSError as error:
+        raise PointCloudError(
+            f"{folder} cannot be written: {error.strerror or error}. Choose another place."
+        ) from error
+    return Store(folder)
+
+
+def points_of_tile(memory: int, options: LaplacianOptions, halo: float = HALO) -> int:
+    """Return how many points a tile may have so that it fits some memory, in bytes, with its halo.
+
+    Raises
+    ------
+    NotEnoughMemoryError
+        Little more than halos would fit.
+    """
+    side = np.sqrt(memory / needed_memory(1, options)) - 2.0 * halo
+    least = needed_memory(1, options) * ((_NARROWEST + 2.0) * halo) ** 2
+    if memory < least:
+        raise NotEnoughMemoryError(
+            f"A tile with its halo takes {least / 2**30:.1f} GB at least, and {memory / 2**30:.1f} GB are allowed."
+            " Allow more, or ask for a narrower kernel."
+        )
+    return int(side**2)
+
+
+@dataclass(frozen=True)
+class _Counted:
+    """What the first pass tells of a cloud."""
+
+    count: int
+    center: Floats
+    scale: float
+    sample: Floats
+    columns: dict[str, tuple[np.dtype[Any], tuple[int, ...]]]
+    left_out: list[str]
+
+    @property
+    def row(self) -> np.dtype[Any]:
+        """A point with its columns."""
+        return np.dtype([(_PLACE, np.float64, (3,)), *self.fields])
+
+    @property
+    def fields(self) -> list[Any]:
+        """Its columns."""
+        return [(name, *kind) for name, kind in self.columns.items()]
+
+
+def _count(chunks: Chunks) -> _Counted:
+    count, stride, sample = 0, 1, np.zeros((0, 3))
+    origin: Floats | None = None
+    first, square = np.zeros(3), 0.0
+    columns: dict[str, tuple[np.dtype[Any], tuple[int, ...]]] = {}
+    names: set[str] = set()
+    for points, others in chunks:
+        points = check_points(points)
+        found = {name: (values.dtype, values.shape[1:]) for name, values in others.items()}
+        if origin is None:
+            origin, columns = points.mean(axis=0), found
+        names |= found.keys()
+        columns = {
+            name: (np.promote_types(kind[0], found[name][0]), kind[1])
+            for name, kind in columns.items()
+            if name in found and kind[1] == found[name][1]
+        }
+        offset = points - origin
+        first += offset.sum(axis=0)
+        square += float(np.einsum("ij,ij->", offset, offset))
+        sample = np.concatenate([sample, points[-count % stride :: stride]])
+        count += len(points)
+        while len(sample) > _SAMPLE:
+            sample, stride = sample[::2], 2 * stride
+    if origin is None:
+        raise TooFewPointsError("There are no points. Name files with points.")
+    mean = first / count
+    scale = max(square / count - float(mean @ mean), 0.0) ** 0.5
+    return _Counted(count, origin + mean, scale, sample, columns, sorted(names - columns.keys()))
+
+
+class _Plan:
+    """Planes that divide a cloud into tiles, at medians of a sample, each across the longest side."""
+
+    def __init__(self, sample: Floats, tiles: int) -> None:
+        self._nodes: list[tuple[int, float, int, int]] = []  # axis, level, and the nodes below and above; ~ of tiles
+        self.tiles = 0
+        self._root = self._divide(sample, tiles)
+
+    def _divide(self, sample: Floats, tiles: int) -> int:
+        below = np.zeros(0, dtype=bool)
+        if tiles > 1 and len(sample) > 1:
+            axis = int(np.ptp(sample, axis=0).argmax())
+            place = tiles // 2 * len(sample) // tiles
+            level = float(np.partition(sample[:, axis], place)[place])
+            below = sample[:, axis] < level
+        if not below.any():
+            self.tiles += 1
+            return ~(self.tiles - 1)
+        node = len(self._nodes)
+        self._nodes.append((axis, level, 0, 0))
+        left, right = self._divide(sample[below], tiles // 2), self._divide(sample[~below], tiles - tiles // 2)
+        self._nodes[node] = axis, level, left, right
+        return node
+
+    def tile(self, points: Floats) -> Ints:
+        """Return the tile of each point, (k,)."""
+        result = np.empty(len(points), dtype=np.int64)
+        waiting = [(self._root, np.arange(len(points)))]
+        while waiting:
+            node, rows = waiting.pop()
+            if node < 0:
+                result[rows] = ~node
+                continue
+            axis, level, left, right = self._nodes[node]
+            below = points[rows, axis] < level
+            waiting += [(left, rows[below]), (right, rows[~below])]
+        return result
+
+
+def _spread(chunks: Chunks, folder: Path, plan: _Plan, counted: _Counted) -> list[int]:
+    """Append all points to the files of their tiles, and return how many each has."""
+    raw = [folder / f"{number:06d}.raw" for number in range(plan.tiles)]
+    for path in raw:
+        path.touch()
+    for points, others in chunks:
+        table = np.empty(len(points), counted.row)
+        table[_PLACE] = points
+        for name in counted.columns:
+            table[name] = others[name]
+        tile = plan.tile(np.asarray(points, dtype=np.float64))
+        order = np.argsort(tile, kind="stable")
+        ends = np.searchsorted(tile[order], np.arange(plan.tiles + 1))
+        for number in np.flatnonzero(np.diff(ends)):
+            with open(raw[number], "ab") as file:
+                file.write(table[order[ends[number] : ends[number + 1]]].tobytes())
+    sizes = []
+    for number, path in enumerate(raw):
+        table = np.fromfile(path, counted.row)
+        tile_folder = folder / f"{number:06d}"
+        tile_folder.mkdir()
+        np.save(tile_folder / POINTS, table[_PLACE])
+        if counted.columns:
+            columns = np.empty(len(table), counted.fields)
+            for name in counted.columns:
+                columns[name] = table[name]
+            np.save(tile_folder / COLUMNS, columns)
+        path.unlink()
+        sizes.append(len(table))
+    if sum(sizes) != counted.count:
+        raise PointCloudError(
+            f"The files held {counted.count:,} points at first and {sum(sizes):,} when read again. Cut them again."
+        )
+    return sizes
+
+
+def find_extent(site: Site, state: Any) -> tuple[None, Told]:
+    """Find the box of a tile, and the spacing in it."""
+    points = site.shelf.own(site.number)
+    if not len(points):
+        raise TooFewPointsError("The tile has no points.")
+    points = check_points(points)
+    distance = cKDTree(points).query(points, k=min(FEW + 1, len(points)))[0].reshape(len(points), -1)
+    spacing = spacing_of(distance) if len(points) > 1 else np.zeros(1)
+    return None, {
+        "low": points.min(axis=0),
+        "high": points.max(axis=0),
+        "usual": np.median(spacing),
+        "widest": spacing.max(),
+        "spacing": spacing,
+    }
+
+
+def find_halo(site: Site, state: Any) -> tuple[None, Told]:
+    """Gather the points around a tile that belong to others."""
+    shelf, number = site.shelf, site.number
+    assert isinstance(shelf, Store)
+    halo, memory = shelf.manifest["halo"], shelf.manifest["memory"]
+    low, high = shelf.bounds(number)
+    usual, count = float(site.told("extent", "usual")), len(shelf.own(number))
+    found = [(np.zeros((0, 3)), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=bool))]
+    gap = np.maximum(np.maximum(low - shelf.record["high"], shelf.record["low"] - high), 0.0)
+    near = np.linalg.norm(gap, axis=1) <= halo * np.maximum(usual, shelf.record["widest"])  # not where there is none
+    near[number] = False
+    for other in np.flatnonzero(near).tolist():
+        points = shelf.own(other)
+        outside = np.linalg.norm(np.maximum(np.maximum(low - points, points - high), 0.0), axis=1)
+        away = outside / np.maximum(np.maximum(shelf.read("extent", other, "spacing"), usual), 1e-300)
+        place = np.flatnonzero(away <= halo)
+        count += len(place)
+        if memory is not None and needed_memory(count, site.options) > memory:
+            raise NotEnoughMemoryError(
+                f"The tile and its halo have {count:,} points or more, which would take more than the"
+                f" {memory / 2**30:.1f} GB that are allowed: its points fill a volume, or lie in heaps. Thin them out"
+                " there, or allow more memory."
+            )
+        found.append((points[place], np.full(len(place), other), place, away[place] <= 0.5 * halo))
+    names = ("points", "owner", "place", "close")
+    return None, {name: np.concatenate(column) for name, column in zip(names, zip(*found, strict=True), strict=True)}
+
+
+def list_boxes(shelf: Any, options: LaplacianOptions) -> Record:
+    """List the boxes of all tiles, and the widest spacing in each; NaN where that is not known."""
+    record = {
+        "low": np.full((shelf.count, 3), np.nan),
+        "high": np.full((shelf.count, 3), np.nan),
+        "widest": np.full(shelf.count, np.nan),
+    }
+    for name, column in record.items():
+        for number in shelf.alive:
+            column[number] = shelf.read("extent", number, name)
+    return record
+
+
+HALOS = (Step("extent", find_extent, list_boxes), Step("halo", find_halo))

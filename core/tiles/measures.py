@@ -1,0 +1,216 @@
+"""The last steps of the walk in tiles: sides, areas, the shares of weights, and all results."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy import sparse
+
+from ..geometry import (
+    Cloud,
+    Decisions,
+    Surface,
+    arc_length,
+    measure_surface,
+    mirrored_cosine,
+    near_edges,
+    orient_patches,
+    side_sums,
+    signs_by_sums,
+)
+from ..operator import LaplaceBeltrami, assemble_laplacian, build_laplacian, mean_curvature, solve_areas
+from ..options import LaplacianOptions
+from ..types import Array, Floats, Ints
+from .labels import agree_on_signs
+from .neighborhoods import divided
+from .shelf import Part, Record, Shelf, Told
+from .site import Site
+
+_LINK = 1e-3  # weight of links between patches of one tile, against points that two tiles have in common
+_TRIAL = 8000  # points on which the weights are balanced, for the shares
+
+
+class Oriented(NamedTuple):
+    """A surface, normals that agree within patches, (m, 3), and the patch of each point, (m,)."""
+
+    surface: Surface
+    normals: Floats
+    patch: Ints
+
+
+class Solved(NamedTuple):
+    """A cloud with distances of pairs along the surface, and areas, (m,), before they are scaled by component."""
+
+    cloud: Cloud
+    areas: Floats
+
+
+def orient_tile(site: Site, surface: Surface) -> tuple[Oriented, Told]:
+    """Divide sheets, and orient the patches of a tile."""
+    surface = divided(site, surface)
+    nearest, scaled = surface.sample.nearest, surface.sample.scaled
+    normals, patch = orient_patches(nearest, surface.quadrics.normals, surface.sample.places)
+    first, second = near_edges(nearest)
+    alike = np.sign(mirrored_cosine(nearest.points, normals, first, second))
+    count = int(patch.max()) + 1
+    votes = sparse.coo_array((alike, (patch[first], patch[second])), shape=(count, count)).tocsr().tocoo()
+    across = votes.row != votes.col
+    return Oriented(surface, normals, patch), {
+        "normal": site.own(scaled, normals, 0.0),
+        "patch": site.own(scaled, patch, -1),
+        "patches": np.array(count),
+        "links": np.stack([votes.row, votes.col], axis=1)[across],
+        "votes": votes.data[across],
+    }
+
+
+def compare_sides(site: Site, oriented: Oriented) -> tuple[None, Told]:
+    """Compare the sides of patches with those of the tiles around."""
+    part, first = site.part, oriented.surface.sample.scaled.first
+    owner = part.owner[first]
+    theirs, normals = site.around("patches", "patch", -1)[first], site.around("patches", "normal", 0.0)[first]
+    common = (part.close & ~part.inner)[first] & (theirs >= 0)
+    alike = np.sign(np.einsum("ij,ij->i", oriented.normals, normals))[common]
+    kinds, kind = np.unique(
+        np.stack([oriented.patch[common], owner[common], theirs[common]]), axis=1, return_inverse=True
+    )
+    return None, {"pairs": kinds.T, "votes": np.bincount(kind.reshape(-1), alike, kinds.shape[1])}
+
+
+def agree_on_flips(shelf: Shelf, options: LaplacianOptions) -> Record:
+    """Agree on which patches are reversed, so that all agree."""
+    alive = [number for number in shelf.alive if shelf.done("sides", number)]
+    counts = np.zeros(max(alive) + 2, dtype=np.int64)
+    counts[np.array(alive) + 1] = [int(count) for count in shelf.told("patches", "patches")]
+    start = np.cumsum(counts)
+    votes: list[Array] = []
+    for number in alive:
+        links, alike = shelf.read("patches", number, "links"), shelf.read("patches", number, "votes")
+        votes.append(np.column_stack([links + start[number], _LINK * alike]))
+        pairs, alike = shelf.read("sides", number, "pairs"), shelf.read("sides", number, "votes")
+        votes.append(np.column_stack([pairs[:, 0] + start[number], start[pairs[:, 1]] + pairs[:, 2], alike]))
+    first, second, weight = np.concatenate(votes).T
+    sign = agree_on_signs(first.astype(int), second.astype(int), weight, int(start[-1]))
+    return {"flip": sign, "flip start": start}
+
+
+def tell_sides(site: Site, oriented: Oriented) -> tuple[Surface, Told]:
+    """Reverse patches, and sum up what tells the outer side of each component."""
+    record, scaled = site.record, oriented.surface.sample.scaled
+    begin = int(record["flip start"][site.number])
+    side = oriented.normals * record["flip"][begin + oriented.patch, None]
+    rows = np.flatnonzero(site.inner(scaled))
+    names, label = np.unique(site.labels()[scaled.first[rows]], return_inverse=True)
+    places, weight = oriented.surface.sample.places[rows], np.ones(len(rows))
+    sums = side_sums(places, side[rows], label.reshape(-1), weight) if len(rows) else np.zeros((0, 10))
+    return oriented.surface, {"side": site.own(scaled, side, 0.0), "name": names, "sums": sums}
+
+
+def agree_on_outside(shelf: Shelf, options: LaplacianOptions) -> Record:
+    """Agree on the outer side of each component."""
+    return {"outer": signs_by_sums(_added(shelf, "outside", "sums"))}
+
+
+def find_areas(site: Site, surface: Surface) -> tuple[Solved, Told]:
+    """Go on to pairs, and solve for areas."""
+    agreed = replace(site.agreed(), ratio=np.ones(int(site.labels().max(initial=0)) + 1))
+    sample = surface.sample
+    decisions = Decisions(agreed)
+    counts = len(site.part.points), int(site.told("spacing", "distinct"))
+    cloud = measure_surface(replace(surface, sample=replace(sample, decisions=decisions)), site.options, counts)
+    distance = arc_length(cloud)
+    areas = solve_areas(cloud, distance)
+    cloud = replace(cloud, pairs=replace(cloud.pairs, distance=distance))
+    inner = site.inner(cloud.scaled)
+    names, label = np.unique(decisions.names(cloud.scaled, cloud.component)[inner], return_inverse=True)
+    label = label.reshape(-1)
+    sums = np.column_stack([np.bincount(label, values[inner], len(names)) for values in (cloud.cell_areas, areas)])
+    return Solved(cloud, areas), {"name": names, "sums": sums}
+
+
+def agree_on_areas(shelf: Shelf, options: LaplacianOptions) -> Record:
+    """Agree on by how much the areas of each component are scaled."""
+    total, found = _added(shelf, "areas", "sums").T
+    return {"ratio": total / np.where(found > 0.0, found, 1.0)}
+
+
+def share_weights(site: Site, state: object) -> tuple[None, Told]:
+    """Balance the weights of the points around the center, for what each round takes from the earlier ones."""
+    part = _around_center(site.shelf)
+    trial = build_laplacian(part.points, options=site.options, agreed=Site(site.shelf, -1, site.options, part).agreed())
+    shares = trial.agreed.shares or ()
+    flat = np.array([share for step in shares for share in step], dtype=float)
+    return None, {"shares": flat, "rounds": np.array([len(step) for step in shares], dtype=np.int64)}
+
+
+def agree_on_shares(shelf: Shelf, options: LaplacianOptions) -> Record:
+    """Agree on these."""
+    return {name: next(shelf.told("shares", name)) for name in ("shares", "rounds")}
+
+
+def measure(site: Site, solved: Solved) -> tuple[None, Told]:
+    """Build the operator of a tile, and tell the results in its box."""
+    cloud, decisions = solved.cloud, site.decisions()
+    names = decisions.names(cloud.scaled, cloud.component)
+    cloud = replace(cloud, decisions=decisions)
+    laplacian = assemble_laplacian(site.part.points, cloud, solved.areas * site.record["ratio"][names], site.options)
+    inner = site.part.inner
+    told = results(laplacian, site.labels(), np.flatnonzero(inner))
+    return None, {**told, "notices": np.array(laplacian.notices, dtype=str)}
+
+
+def results(laplacian: LaplaceBeltrami, label: Ints | None, rows: Ints) -> Told:
+    """Return the results at some points of a tile, by the names of `Measured`; components by labels of all, (k,)."""
+    component = laplacian.component[rows]
+    found = {
+        name: getattr(laplacian, name)[rows]
+        for name in (
+            "normals",
+            "areas",
+            "smoothing_lengths",
+            "quadric_mean_curvature",
+            "gaussian_curvature",
+            "boundary",
+            "trust",
+            "doubt",
+            "surface_points",
+        )
+    }
+    found["mean_curvature"] = mean_curvature(laplacian)[rows]
+    found["component"] = component if label is None else np.where(component < 0, -1, label[rows])
+    return found
+
+
+def _added(shelf: Shelf, step: str, name: str) -> Floats:
+    """Return sums over all tiles, (labels, k), of what a step has told of each for the names of some labels."""
+    names, parts = list(shelf.told(step, "name")), list(shelf.told(step, name))
+    total = np.zeros((max(int(label.max(initial=-1)) for label in names) + 1, parts[0].shape[1]))
+    for label, part in zip(names, parts, strict=True):
+        total[label] += part
+    return total
+
+
+def _around_center(shelf: Shelf) -> Part:
+    """Return the points around the one that is next to the center of all."""
+    middle = shelf.record["center"]
+    for count in (1, _TRIAL):
+        found = np.zeros((0, 6))
+        away = {}
+        for number in shelf.alive:
+            low, high = shelf.bounds(number)
+            away[number] = float(np.linalg.norm(np.maximum(np.maximum(low - middle, middle - high), 0.0)))
+        for number in sorted(away, key=lambda number: away[number]):
+            if len(found) == count and found[-1, 0] < away[number]:
+                break
+            points = shelf.own(number)
+            distance = np.linalg.norm(points - middle, axis=1)
+            near = np.argsort(distance, kind="stable")[:count]
+            rows = np.column_stack([distance[near], np.full(len(near), number), near, points[near]])
+            found = np.concatenate([found, rows])
+            found = found[np.argsort(found[:, 0], kind="stable")[:count]]
+        middle = found[0, 3:]
+    owner, place = found[:, 1].astype(np.int64), found[:, 2].astype(np.int64)
+    every = np.ones(len(found), dtype=bool)
+    return Part(found[:, 3:], every, every, owner, place)

@@ -1,0 +1,242 @@
+"""The first steps of the walk in tiles: spacing, outliers, components, noise and sheets."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..geometry import (
+    COUNT,
+    FILLING,
+    MANY,
+    Sample,
+    Surface,
+    check_points,
+    choose_bridges,
+    divide_components,
+    divide_sheets,
+    drop_outliers,
+    find_gaps,
+    fit_surface,
+    gap_reach,
+    gather,
+    join_touching,
+    measure_noise,
+    near_misfit,
+    number_sizes,
+    remove_noise,
+    scale_points,
+    sheet_neighbors,
+    with_scatter,
+)
+from ..memory import check_memory
+from ..options import LaplacianOptions
+from ..types import Floats, Ints
+from .labels import label_links, merge_labels, names_of
+from .medians import median
+from .shelf import Record, Shelf, Told
+from .site import Site
+
+
+class Fitted(NamedTuple):
+    """A surface, and what quadrics through 20 neighbours miss these by, (m,); None where noise is not looked for."""
+
+    surface: Surface
+    near: Floats | None
+
+
+def find_spacing(site: Site, state: Any) -> tuple[Sample, Told]:
+    """Find the neighbours of the points of a tile."""
+    points = check_points(site.part.points)
+    check_memory(len(points), site.options)
+    scaled = scale_points(points, site.needed, site.decisions())
+    sample = gather(scaled, site.decisions())
+    inner = site.inner(scaled)
+    return sample, {"spacing": sample.nearest.spacing[inner], "distinct": np.array(len(scaled.points))}
+
+
+def agree_on_spacing(shelf: Shelf, options: LaplacianOptions) -> Record:
+    """Agree on the usual spacing."""
+    return {"spacing": np.array(median(lambda: shelf.told("spacing", "spacing")))}
+
+
+def find_reach(site: Site, sample: Sample) -> tuple[Sample | None, Told]:
+    """Leave outliers out."""
+    left = drop_outliers(replace(sample, decisions=site.decisions()), site.needed)
+    changed = left.nearest is not sample.nearest
+    return left if changed else None, {"reach": gap_reach(left.nearest)[site.inner(left.scaled)]}
+
+
+def agree_on_reach(shelf: Shelf, options: LaplacianOptions) -> Record:
+    """Agree on the usual edge that is no gap."""
+    return {"reach": np.array(median(lambda: shelf.told("reach", "reach")))}
+
+
+def link_strictly(site: Site, sample: Sample) -> tuple[None, Told]:
+    """Join neighbours over edges that are no gaps."""
+    strict, _ = find_gaps(sample.nearest, float(site.record["reach"]))
+    row, column = np.nonzero(strict & site.inner(sample.scaled)[:, None])
+    return None, label_links(site, sample.scaled, row, sample.nearest.index[row, 1 + column])
+
+
+def agree_on_large(shelf: Shelf, options: LaplacianOptions) -> Record:
+    """Agree on which components have some size."""
+    merged = merge_labels(shelf, "gaps")
+    return names_of("gaps", "large", merged.start, (number_sizes(merged.size, COUNT) >= 0)[merged.label])
+
+
+def link_loosely(site: Site, sample: Sample) -> tuple[None, Told]:
+    """Join components of some size over wider edges."""
+    strict, loose = find_gaps(sample.nearest, float(site.record["reach"]))
+    large = site.named("gaps", "large", False)[sample.scaled.first]
+    strict |= loose & large[:, None] & large[sample.nearest.index[:, 1:]]
+    inner = site.inner(sample.scaled)
+    row, column = np.nonzero(strict & inner[:, None])
+    told = label_links(site, sample.scaled, row, sample.nearest.index[row, 1 + column])
+    many = np.zeros(len(told["size"]), dtype=bool)
+    own = told["label"]
+    many[own[own >= 0]] = large[sample.scaled.inverse[site.part.inner][own >= 0]]
+    return None, {**told, "large": many}
+
+
+def agree_on_components(shelf: Shelf, options: LaplacianOptions) -> Record:
+    """Agree on the numbers of components."""
+    merged = merge_labels(shelf, "components")
+    large = np.zeros(len(merged.size), dtype=bool)
+    np.logical_or.at(large, merged.label, np.concatenate(list(shelf.told("components", "large"))))
+    number = np.full(len(merged.size), -1)
+    number[large] = number_sizes(merged.size[large], COUNT)
+    smallest = merged.size[number >= 0].min()
+    return {**names_of("components", "component", merged.start, number[merged.label]), "smallest": smallest}
+
+
+def find_noise(site: Site, sample: Sample) -> tuple[Fitted, Told]:
+    """Fit quadrics, and measure the noise."""
+    sample = divide_components(replace(sample, decisions=site.decisions()), site.needed)
+    surface = with_scatter(fit_surface(sample, site.options.sheets))
+    inner = site.inner(surface.sample.scaled)
+    if site.options.projection != "auto":
+        return Fitted(surface, None), {"counts": np.array([np.count_nonzero(inner), 0, 0])}
+    near = near_misfit(surface.sample.nearest)
+    noise = measure_noise(surface, near)[inner]
+    counts = [np.count_nonzero(inner), np.count_nonzero(noise > 0.0), np.count_nonzero(noise > FILLING)]
+    return Fitted(surface, near), {"counts": np.array(counts)}
+
+
+def agree_on_noise(shelf: Shelf, options: LaplacianOptions) -> Record:
+    """Agree on whether there is noise to smooth, and on the tile that tells of points that fill volumes."""
+    if options.projection != "auto":
+        return {}
+    alive = [number for number in shelf.alive if shelf.done("noise", number)]
+    counts = np.stack(list(shelf.told("noise", "counts")))
+    count, noisy, _ = counts.sum(axis=0)
+    return {"noisy": np.array(noisy / count >= MANY), "fullest": np.array(alive[int(counts[:, 2].argmax())])}
+
+
+def find_filling(site: Site, fitted: Fitted) -> tuple[None, Told]:
+    """Follow how points that fill volumes fare as noise is smoothed."""
+    found = remove_noise(_with_decisions(site, fitted.surface), site.options, fitted.near)
+    filling = found.sample.decisions.made.filling
+    return None, {"filling": np.array(() if filling is None else filling)}
+
+
+def agree_on_filling(shelf: Shelf, options: LaplacianOptions) -> Record:
+    """Agree on that."""
+    told = [filling for filling in shelf.told("filling", "filling") if len(filling)]
+    return {"filling": told[0]} if told else {}
+
+
+def link_sheets(site: Site, fitted: Fitted) -> tuple[Surface, Told]:
+    """Smooth noise, and join neighbours on sheets."""
+    surface = remove_noise(_with_decisions(site, fitted.surface), site.options, fitted.near)
+    return surface, _link_neighbors(site, surface, surface.quadrics.normals, False) if site.options.sheets else {}
+
+
+def agree_on_large_sheets(shelf: Shelf, options: LaplacianOptions) -> Record:
+    """Agree on the numbers of sheets of some size."""
+    if not options.sheets:
+        return {}
+    merged = merge_labels(shelf, "sheets")
+    return names_of("sheets", "large sheet", merged.start, number_sizes(merged.size, COUNT)[merged.label])
+
+
+def join_sheets(site: Site, surface: Surface) -> tuple[None, Told]:
+    """Join small sheets to those that they touch, and tell which sheets there are of which components."""
+    sample = surface.sample
+    sheet = join_touching(sample.nearest, site.named("sheets", "large sheet")[sample.scaled.first])
+    component = site.named("components", "component")[sample.scaled.first]
+    inner = site.inner(sample.scaled)
+    rows = np.flatnonzero(inner & (sheet >= 0))
+    kinds, number, size = np.unique(
+        np.stack([component[rows], sheet[rows]]), axis=1, return_inverse=True, return_counts=True
+    )
+    label = np.full(len(sheet), -1)
+    label[rows] = number.reshape(-1)
+    return None, {"label": site.own(sample.scaled, label, -1), "kind": kinds.T, "size": size}
+
+
+def agree_on_sheets(shelf: Shelf, options: LaplacianOptions) -> Record:
+    """Agree on the numbers of sheets within components."""
+    alive = [number for number in shelf.alive if shelf.done("touching", number)]
+    kinds = list(shelf.told("touching", "kind"))
+    counts = np.zeros(max(alive) + 2, dtype=np.int64)
+    counts[np.array(alive) + 1] = [len(kind) for kind in kinds]
+    _, label = np.unique(np.concatenate(kinds), axis=0, return_inverse=True)
+    label = label.reshape(-1)
+    size = np.bincount(label, np.concatenate(list(shelf.told("touching", "size")))).astype(np.int64)
+    return names_of("touching", "sheet", np.cumsum(counts), number_sizes(size, 0)[label])
+
+
+def link_pieces(site: Site, surface: Surface) -> tuple[None, Told]:
+    """Join neighbours on the same side of sheets."""
+    return None, _link_neighbors(site, surface, site.sides()[surface.sample.scaled.first], True)
+
+
+def agree_on_pieces(shelf: Shelf, options: LaplacianOptions) -> Record:
+    """Agree on which pieces these make."""
+    merged = merge_labels(shelf, "pieces")
+    return names_of("pieces", "piece", merged.start, merged.label)
+
+
+def find_bridges(site: Site, surface: Surface) -> tuple[None, Told]:
+    """Find the shortest edges between pieces."""
+    nearest, first = surface.sample.nearest, surface.sample.scaled.first
+    piece = site.named("pieces", "piece")[first]
+    inner = site.inner(surface.sample.scaled)
+    other = piece[nearest.index]
+    row, column = np.nonzero((other != piece[:, None]) & (other >= 0) & inner[:, None])
+    second = nearest.index[row, column]
+    gap, ends = nearest.distance[row, column], np.stack([piece[row], piece[second]], axis=1)
+    order = np.lexsort((gap, *np.sort(ends, axis=1).T))
+    _, shortest = np.unique(np.sort(ends[order], axis=1), axis=0, return_index=True)
+    kept = order[shortest]
+    part = site.part
+    rows = first[row[kept]], first[second[kept]]
+    edge = np.column_stack([column for end in rows for column in (part.owner[end], part.place[end])])
+    return None, {"piece": ends[kept], "gap": gap[kept], "edge": edge.reshape(-1, 4).astype(np.int64)}
+
+
+def agree_on_bridges(shelf: Shelf, options: LaplacianOptions) -> Record:
+    """Agree on the edges over which pieces hang together."""
+    piece, gap, edge = (np.concatenate(list(shelf.told("bridges", name))) for name in ("piece", "gap", "edge"))
+    bridges: Ints = edge[choose_bridges(piece[:, 0], piece[:, 1], gap)]
+    return {"bridges": bridges}
+
+
+def divided(site: Site, surface: Surface) -> Surface:
+    """Return the surface of a tile, divided into sheets, if the options ask for it."""
+    surface = _with_decisions(site, surface)
+    return divide_sheets(surface, site.needed) if site.options.sheets else surface
+
+
+def _with_decisions(site: Site, surface: Surface) -> Surface:
+    return replace(surface, sample=replace(surface.sample, decisions=site.decisions()))
+
+
+def _link_neighbors(site: Site, surface: Surface, normals: Floats, oriented: bool) -> Told:
+    sample = surface.sample
+    near = sheet_neighbors(sample.nearest, normals, oriented)
+    row, column = np.nonzero(near & site.inner(sample.scaled)[:, None])
+    return label_links(site, sample.scaled, row, sample.nearest.index[row, column])

@@ -1,0 +1,110 @@
+"""The steps of the walk in tiles: each is at all tiles, one by one and in any order, and then agreed on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from time import process_time
+from typing import Any
+
+import numpy as np
+
+from ..errors import ComponentError, PointCloudError
+from ..options import LaplacianOptions
+from . import measures, neighborhoods
+from .shelf import Record, Shelf, Told
+from .site import Site
+
+
+def _all(shelf: Shelf) -> Sequence[int]:
+    return shelf.alive
+
+
+def _first(shelf: Shelf) -> Sequence[int]:
+    return shelf.alive[:1]
+
+
+def _fullest(shelf: Shelf) -> Sequence[int]:
+    return [int(shelf.record["fullest"])] if "fullest" in shelf.record else []
+
+
+def _nothing(shelf: Shelf, options: LaplacianOptions) -> Record:
+    return {}
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step of the walk.
+
+    Attributes
+    ----------
+    name : str
+    local : callable
+        From the site of a tile, and the state that an earlier step has left there, to a new state, or None where that
+        one stays, and to what the step tells of the tile.
+    merge : callable
+        From the shelf and the options to what all tiles agree on then: small against the points.
+    where : callable
+        From the shelf to the numbers of the tiles at which the step is needed.
+    of_sheets : bool
+        Whether it is needed only where close sheets are kept apart.
+    """
+
+    name: str
+    local: Callable[[Site, Any], tuple[Any, Told]]
+    merge: Callable[[Shelf, LaplacianOptions], Record] = _nothing
+    where: Callable[[Shelf], Sequence[int]] = _all
+    of_sheets: bool = False
+
+
+_SURVEY = (
+    Step("spacing", neighborhoods.find_spacing, neighborhoods.agree_on_spacing),
+    Step("reach", neighborhoods.find_reach, neighborhoods.agree_on_reach),
+    Step("gaps", neighborhoods.link_strictly, neighborhoods.agree_on_large),
+    Step("components", neighborhoods.link_loosely, neighborhoods.agree_on_components),
+    Step("noise", neighborhoods.find_noise, neighborhoods.agree_on_noise),
+    Step("filling", neighborhoods.find_filling, neighborhoods.agree_on_filling, _fullest),
+    Step("sheets", neighborhoods.link_sheets, neighborhoods.agree_on_large_sheets),
+    Step("touching", neighborhoods.join_sheets, neighborhoods.agree_on_sheets, of_sheets=True),
+    Step("patches", measures.orient_tile),
+    Step("sides", measures.compare_sides, measures.agree_on_flips),
+    Step("outside", measures.tell_sides, measures.agree_on_outside),
+    Step("pieces", neighborhoods.link_pieces, neighborhoods.agree_on_pieces, of_sheets=True),
+    Step("bridges", neighborhoods.find_bridges, neighborhoods.agree_on_bridges, of_sheets=True),
+    Step("areas", measures.find_areas, measures.agree_on_areas),
+    Step("shares", measures.share_weights, measures.agree_on_shares, _first),
+)
+MEASURE = Step("measure", measures.measure)
+
+
+def survey_steps(options: LaplacianOptions) -> list[Step]:
+    """Return the steps, in their order, after which all is agreed on."""
+    return [step for step in _SURVEY if options.sheets or not step.of_sheets]
+
+
+def visit(shelf: Shelf, step: Step, number: int, options: LaplacianOptions) -> None:
+    """Take a step at one tile, unless that is done, and keep what it tells."""
+    if shelf.done(step.name, number):
+        return
+    began = process_time()
+    try:
+        state, told = step.local(Site(shelf, number, options), shelf.state(step.name, number))
+    except PointCloudError as error:
+        if step.where is not _all:  # it is of all tiles, if at one place
+            raise
+        shelf.fail(step.name, number, error)
+    else:
+        shelf.put(step.name, number, {**told, "seconds": np.array(process_time() - began)}, state)
+
+
+def agree(shelf: Shelf, step: Step, options: LaplacianOptions) -> Record:
+    """Return what all tiles agree on after a step that has been at all of them.
+
+    Raises
+    ------
+    ComponentError
+        No tile is left that can be measured.
+    """
+    if not shelf.alive:
+        raise ComponentError("None of the tiles can be measured. See the error of each in the report.")
+    return step.merge(shelf, options)

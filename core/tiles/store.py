@@ -1,0 +1,254 @@
+"""Tiles on disk: each step writes files that are whole or missing, so that it can be taken again after anything."""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import zipfile
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from ..errors import PointCloudError
+from ..files import replacing
+from ..options import LaplacianOptions
+from ..types import Array, Floats
+from .shelf import Part, Record, Told
+
+VERSION = 1
+POINTS, COLUMNS = "points.npy", "columns.npy"
+_MANIFEST, _ERROR = "manifest.json", "error.json"
+_TRUSTED = ("numpy", "scipy", "builtins", "copyreg", __package__.rpartition(".")[0])  # packages of what states hold
+_BUILTINS = {"slice", "set", "frozenset", "complex", "bytearray", "range", "object"}
+
+
+class Store:
+    """A folder with the tiles of a cloud, and what each step has found about them.
+
+    Parameters
+    ----------
+    folder : path-like
+        Made by `cut_to_store`.
+
+    Attributes
+    ----------
+    manifest : dict
+        Options, sources, how the cloud was cut, and what is agreed on from the start.
+    record : dict
+        What is agreed on so far.
+
+    Raises
+    ------
+    PointCloudError
+        There is no such store, or it was written by another version.
+    """
+
+    def __init__(self, folder: str | os.PathLike[str]) -> None:
+        self.folder = Path(folder)
+        try:
+            self.manifest = json.loads((self.folder / _MANIFEST).read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise PointCloudError(f"{folder} holds no tiles: {error}. Cut a cloud into it first.") from error
+        if self.manifest.get("version") != VERSION:
+            raise PointCloudError(
+                f"{folder} was written by another version of the extension. Cut the cloud into a new folder."
+            )
+        agreed: dict[str, Any] = {name: np.asarray(value) for name, value in self.manifest["agreed"].items()}
+        self._start, self.record = agreed, agreed
+        self.load_record()
+
+    @property
+    def options(self) -> LaplacianOptions:
+        """The settings."""
+        return LaplacianOptions(**self.manifest["options"])
+
+    @property
+    def count(self) -> int:
+        """How many tiles there are."""
+        return len(self.manifest["tiles"])
+
+    @property
+    def alive(self) -> Sequence[int]:
+        """The numbers of the tiles that can be measured."""
+        return [number for number in range(self.count) if not (self._tile(number) / _ERROR).exists()]
+
+    def load_record(self) -> None:
+        """Read what is agreed on so far."""
+        record: Record = dict(self._start)
+        for path in sorted(self.folder.glob("agreed-*.npz")):
+            with np.load(path) as found:
+                record |= dict(found)
+        self.record = record
+
+    def agreed_after(self, step: str) -> bool:
+        """Whether all tiles have agreed on something after a step."""
+        return self._agreed(step).exists()
+
+    def settle(self, step: str, record: Record) -> None:
+        """Keep what all tiles agree on after a step."""
+        _save(self._agreed(step), record)
+        self.record = {**self.record, **record}
+
+    def part(self, number: int) -> Part:
+        """Return the points of a tile with its halo."""
+        own = self.own(number)
+        halo = {name: self.read("halo", number, name) for name in ("points", "owner", "place", "close")}
+        inner = np.arange(len(own) + len(halo["owner"])) < len(own)
+        return Part(
+            points=np.concatenate([own, halo["points"]]),
+            inner=inner,
+            close=np.concatenate([np.ones(len(own), dtype=bool), halo["close"]]),
+            owner=np.concatenate([np.full(len(own), number), halo["owner"]]),
+            place=np.concatenate([np.arange(len(own)), halo["place"]]),
+        )
+
+    def bounds(self, number: int) -> tuple[Floats, Floats]:
+        """Return the lowest and highest coordinates in the box of a tile."""
+        return self.record["low"][number], self.record["high"][number]
+
+    def own(self, number: int) -> Floats:
+        """Return the points in the box of a tile."""
+        return np.load(self._tile(number) / POINTS)
+
+    def columns(self, number: int) -> dict[str, Array]:
+        """Return what the input told of these points besides."""
+        path = self._tile(number) / COLUMNS
+        if not path.exists():
+            return {}
+        found = np.load(path)
+        return {name: np.ascontiguousarray(found[name]) for name in found.dtype.names or ()}
+
+    def read(self, step: str, number: int, name: str) -> Array:
+        """Return what a step has told of a tile under a name."""
+        path = self._path(step, number)
+        try:
+            with np.load(path) as found:
+                result: Array = found[name]
+                return result
+        except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+            raise PointCloudError(f"{path} cannot be read: {error}. Delete it, and take the steps again.") from error
+
+    def told(self, step: str, name: str) -> Iterator[Array]:
+        """Yield what a step has told of each tile under a name, but for those where it has not been."""
+        return (self.read(step, number, name) for number in self.alive if self.done(step, number))
+
+    def names(self, step: str, number: int) -> list[str]:
+        """Return the names under which a step has told something of a tile."""
+        with np.load(self._path(step, number)) as found:
+            return list(found.files)
+
+    def done(self, step: str, number: int) -> bool:
+        """Whether a step has been at a tile."""
+        return self._path(step, number).exists()
+
+    def state(self, step: str, number: int) -> Any:
+        """Return what the last step at a tile before this one has left to go on from; None at first.
+
+        A step that was killed after it had left its own state begins again from the one before.
+        """
+        before = self._states(number, but=step)
+        if not before:
+            return None
+        path = before[-1]
+        try:
+            with open(path, "rb") as file:
+                return _Reader(file).load()
+        except (OSError, EOFError, pickle.UnpicklingError) as error:
+            raise PointCloudError(f"{path} cannot be read: {error}. Cut the cloud again.") from error
+
+    def put(self, step: str, number: int, told: Told, state: Any) -> None:
+        """Keep what a step has told of a tile, and its state, unless that is None: then the last one stays."""
+        before = self._states(number, but=step)
+        if state is not None:
+            place = int(before[-1].stem.split("-")[1]) + 1 if before else 0
+            path = self._tile(number) / f"state-{place:02d}-{step}.pickle"
+            with replacing(path) as part, open(part, "wb") as file:
+                pickle.dump(state, file, protocol=pickle.HIGHEST_PROTOCOL)
+        _save(self._path(step, number), told)
+        if state is not None:
+            for path in before:
+                path.unlink(missing_ok=True)
+
+    def forget(self, number: int) -> None:
+        """Delete the states of a tile: no step goes on from there."""
+        for path in self._states(number):
+            path.unlink(missing_ok=True)
+
+    def fail(self, step: str, number: int, error: PointCloudError) -> None:
+        """Note that a tile cannot be measured."""
+        with replacing(self._tile(number) / _ERROR) as part:
+            part.write_text(json.dumps({"step": step, "error": str(error)}), encoding="utf-8")
+        self.forget(number)
+
+    def error(self, number: int) -> str | None:
+        """Return why a tile cannot be measured; None if it can."""
+        path = self._tile(number) / _ERROR
+        if not path.exists():
+            return None
+        text: str = json.loads(path.read_text(encoding="utf-8"))["error"]
+        return text
+
+    def _tile(self, number: int) -> Path:
+        return self.folder / f"{number:06d}"
+
+    def _path(self, step: str, number: int) -> Path:
+        return self._tile(number) / f"{step}.npz"
+
+    def _states(self, number: int, but: str = "") -> list[Path]:
+        """Return the states of a tile in the order in which they were left, but for that of one step."""
+        found = sorted(self._tile(number).glob("state-*.pickle"))
+        return [path for path in found if path.stem.split("-")[2] != but]
+
+    def _agreed(self, step: str) -> Path:
+        return self.folder / f"agreed-{step}.npz"
+
+
+def _save(path: Path, arrays: Any) -> None:
+    with replacing(path) as part:
+        np.savez(part, **arrays)
+
+
+class _Reader(pickle.Unpickler):
+    """Reads states, which hold arrays and classes of this package: anything else is no state."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        super().__init__(file)
+
+    def find_class(self, module: str, name: str) -> Any:
+        """Return a class that a state may hold."""
+        package = module if module.startswith(_TRUSTED[-1]) else module.partition(".")[0]
+        known = any(package == trusted or package.startswith(f"{trusted}.") for trusted in _TRUSTED)
+        if not known or (package == "builtins" and name not in _BUILTINS):
+            raise pickle.UnpicklingError(f"it holds {module}.{name}, which is no part of a state")
+        return super().find_class(module, name)
+
+
+def write_manifest(
+    folder: Path, options: LaplacianOptions, tiles: Sequence[int], agreed: dict[str, Any], known: dict[str, Any]
+) -> None:
+    """Write the manifest of a store, of which it is the last file.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+    options : LaplacianOptions
+    tiles : sequence of int
+        Points in each box.
+    agreed : dict
+        What is agreed on from the start.
+    known : dict
+        What else is told of the cloud.
+    """
+    manifest = {
+        "version": VERSION,
+        **known,
+        "options": asdict(options),
+        "agreed": {name: np.asarray(value).tolist() for name, value in agreed.items()},
+        "tiles": [{"points": int(count)} for count in tiles],
+    }
+    with replacing(folder / _MANIFEST) as part:
+        part.write_text(json.dumps(manifest, indent=1), encoding="utf-8")

@@ -1,0 +1,238 @@
+"""Tiles on disk: the same as in memory, whatever is killed, and whatever is wrong with some of them."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import core
+from core.tiles.medians import median
+
+HALO, DEGREE = 45.0, 12  # as in the tests of tiles in memory
+LENGTH, RADIUS, COUNT = 12.0, 0.125, 3000
+
+
+@cache
+def rod():
+    """Return random points of a rod with noise, (n, 3)."""
+    rng = np.random.default_rng(3)
+    angle, along = rng.uniform(0.0, 2.0 * np.pi, COUNT), rng.uniform(0.0, LENGTH, COUNT)
+    spacing = np.sqrt(2.0 * np.pi * RADIUS * LENGTH / COUNT)
+    points = np.column_stack([along, RADIUS * np.cos(angle), RADIUS * np.sin(angle)])
+    return points + 0.15 * spacing * rng.normal(size=points.shape)
+
+
+def stored(folder, points, most, pieces=3, **columns):
+    """Cut points into a store, read in several pieces."""
+    parts = np.array_split(np.arange(len(points)), pieces)
+    columns = {"row": np.arange(len(points)), **columns}
+
+    def chunks():
+        return ((points[part], {name: values[part] for name, values in columns.items()}) for part in parts)
+
+    return core.tiles.cut_to_store(chunks, folder / "store", most, halo=HALO, degree=DEGREE)
+
+
+def joined(store, name):
+    """Return a result at all points in the order of the input."""
+    rows = np.concatenate([store.columns(number)["row"] for number in store.alive])
+    values = np.concatenate([store.read("measure", number, name) for number in store.alive])
+    return values[np.argsort(rows)]
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory):
+    store = stored(tmp_path_factory.mktemp("tiles"), rod(), 800)
+    core.tiles.run_steps(store)
+    return store
+
+
+@cache
+def whole():
+    return core.build_laplacian(rod(), agreed=core.geometry.Agreed(degree=DEGREE))
+
+
+def same(found, wanted, rtol=1e-5):
+    np.testing.assert_allclose(found, wanted, rtol=0.0, atol=rtol * np.abs(wanted).max())
+
+
+class TestStore:
+    def test_gives_what_the_whole_gives(self, measured):
+        laplacian = whole()
+        assert measured.count == 4
+        for name in ("normals", "areas", "smoothing_lengths", "gaussian_curvature", "trust", "surface_points"):
+            same(joined(measured, name), getattr(laplacian, name))
+        same(joined(measured, "mean_curvature"), core.mean_curvature(laplacian))
+        np.testing.assert_array_equal(joined(measured, "boundary"), laplacian.boundary)
+        np.testing.assert_array_equal(joined(measured, "component"), laplacian.component)
+        assert abs(joined(measured, "areas").sum() / laplacian.areas.sum() - 1.0) < 1e-9
+
+    def test_agrees_with_another_cut_of_points_in_another_order(self, measured, tmp_path):
+        order = np.random.default_rng(0).permutation(COUNT)
+        other = stored(tmp_path, rod()[order], 1100, pieces=1)
+        core.tiles.run_steps(other)
+        assert other.count == 3
+        for name in ("normals", "areas", "mean_curvature"):
+            same(joined(other, name), joined(measured, name)[order])
+
+    def test_keeps_no_states_and_no_parts_at_the_end(self, measured):
+        names = {path.name.partition(".")[0] for path in measured.folder.rglob("*")}
+        assert not any(name.startswith(("state", ".")) or not name for name in names)
+
+    def test_does_nothing_again(self, measured):
+        before = {path: path.stat().st_mtime_ns for path in measured.folder.rglob("*")}
+        core.tiles.run_steps(core.tiles.Store(measured.folder))
+        assert {path: path.stat().st_mtime_ns for path in measured.folder.rglob("*")} == before
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+import core
+folder, step = sys.argv[1:]
+store = core.tiles.Store(folder)
+replace = os.replace
+def dies(source, target):
+    if Path(target).stem == step:
+        os.kill(os.getpid(), signal.SIGKILL)
+    replace(source, target)
+os.replace = dies
+core.tiles.run_steps(store)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL there")
+def test_a_killed_walk_goes_on_to_the_same_bits(measured, tmp_path):
+    store = stored(tmp_path, rod(), 800)
+    root = Path(__file__).parents[2]
+    for step in ("sheets", "agreed-patches"):  # while a tile tells, and while all agree
+        died = subprocess.run([sys.executable, "-c", KILLED, store.folder, step], cwd=root)
+        assert died.returncode == -signal.SIGKILL
+        assert list(store.folder.rglob(f".{step}.*"))
+    store = core.tiles.Store(store.folder)
+    core.tiles.run_steps(store)
+    for number in measured.alive:
+        for name in ("areas", "mean_curvature", "normals"):
+            np.testing.assert_array_equal(store.read("measure", number, name), measured.read("measure", number, name))
+    assert not list(store.folder.rglob(".*"))
+    assert not list(store.folder.rglob("state-*"))
+
+
+class TestBrokenTiles:
+    def test_are_told_and_the_others_done(self, tmp_path):
+        store = stored(tmp_path, rod(), 450)
+        end = np.argsort([store.own(number)[:, 0].mean() for number in range(store.count)])[-4:]
+        away = [50.0, 0.0, 0.0]  # beyond all halos
+        for number, points in zip(
+            end,
+            (
+                np.zeros((0, 3)),
+                away + 0.01 * np.eye(3),
+                np.linspace(0.0, 1.0, 200)[:, None] * away + 2.0 * np.array(away),
+                np.full((200, 3), np.nan),
+            ),
+            strict=True,
+        ):
+            np.save(store.folder / f"{number:06d}" / "points.npy", points)
+        core.tiles.run_steps(store)
+        errors = [store.error(number) for number in end]
+        for error, text in zip(errors, ("no points", "different points", "straight line", "not finite"), strict=True):
+            assert text in error
+        assert store.alive == sorted(set(range(store.count)) - set(end.tolist()))
+        for number in store.alive:
+            assert np.all(store.read("measure", number, "component") == 0)
+            assert np.all(store.read("measure", number, "areas") > 0.0)
+
+    def test_that_fill_a_volume_ask_for_too_much_memory(self, tmp_path):
+        cube = np.random.default_rng(0).random((3000, 3))
+        points = np.concatenate([rod(), cube + [50.0, 0.0, 0.0]])
+        needed = core.memory.needed_memory(2200, core.LaplacianOptions())
+        store = core.tiles.cut_to_store(lambda: [(points, {})], tmp_path / "store", 800, halo=30.0, memory=needed)
+        core.tiles.run_steps(store)
+        errors = [store.error(number) for number in range(store.count)]
+        crowded = [store.own(number)[:, 0].min() > 49.0 for number in range(store.count)]
+        assert sum(crowded) >= 3
+        for error, in_cube in zip(errors, crowded, strict=True):
+            assert (error is not None) == in_cube
+            assert error is None or "fill a volume" in error
+
+    def test_are_not_all(self, tmp_path):
+        line = np.column_stack([np.linspace(0.0, 1.0, 500), np.zeros((500, 2))])
+        store = core.tiles.cut_to_store(lambda: [(line, {})], tmp_path / "store", 300)
+        with pytest.raises(core.ComponentError, match="None of the tiles"):
+            core.tiles.run_steps(store)
+
+
+class TestCut:
+    def test_keeps_columns_that_all_chunks_have(self, tmp_path):
+        points = rod()
+
+        def chunks():
+            yield points[:1000], {"class": np.full(1000, 2, np.uint8), "lone": np.zeros(1000)}
+            yield points[1000:], {"class": np.full(2000, 300, np.uint16)}
+
+        store = core.tiles.cut_to_store(chunks, tmp_path / "store", 1600)
+        assert [list(store.columns(number)) for number in range(store.count)] == [["class"], ["class"]]
+        counts = np.bincount(np.concatenate([store.columns(number)["class"] for number in range(2)]))
+        assert (counts[2], counts[300]) == (1000, 2000)
+        assert store.manifest["columns left out"] == ["lone"]
+
+    def test_finds_center_and_scale(self, tmp_path):
+        points = rod() + [1e6, 0.0, 0.0]
+        store = stored(tmp_path, points, 800, pieces=7)
+        scaled = points - points.mean(axis=0)
+        np.testing.assert_allclose(store.record["center"], points.mean(axis=0), rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(store.record["scale"], np.sqrt((scaled**2).sum(axis=1).mean()), rtol=1e-12)
+
+    def test_refuses_a_folder_that_exists(self, measured):
+        with pytest.raises(core.PointCloudError, match="exists"):
+            core.tiles.cut_to_store(lambda: [(rod(), {})], measured.folder, 100)
+
+    def test_refuses_files_that_change(self, tmp_path):
+        counts = iter((3000, 2000))
+        with pytest.raises(core.PointCloudError, match="when read again"):
+            core.tiles.cut_to_store(lambda: [(rod()[: next(counts)], {})], tmp_path / "store", 800)
+
+    def test_needs_memory_for_more_than_halos(self):
+        options = core.LaplacianOptions()
+        most = core.tiles.points_of_tile(2 << 30, options)
+        with_halo = (np.sqrt(most) + 2.0 * core.tiles.HALO) ** 2
+        assert 0.99 < core.memory.needed_memory(int(with_halo), options) / (2 << 30) <= 1.0
+        with pytest.raises(core.NotEnoughMemoryError, match="at least"):
+            core.tiles.points_of_tile(1 << 27, options)
+
+
+def test_no_store(tmp_path):
+    with pytest.raises(core.PointCloudError, match="holds no tiles"):
+        core.tiles.Store(tmp_path)
+    (tmp_path / "manifest.json").write_text(json.dumps({"version": 0}))
+    with pytest.raises(core.PointCloudError, match="another version"):
+        core.tiles.Store(tmp_path)
+
+
+def test_a_state_that_calls_something_is_refused(measured, tmp_path):
+    import pickle
+
+    class Calls:
+        def __reduce__(self):
+            return os.mkdir, (str(tmp_path / "called"),)
+
+    shutil.copytree(measured.folder, tmp_path / "store")
+    store = core.tiles.Store(tmp_path / "store")
+    (store.folder / "000000" / "state-00-x.pickle").write_bytes(pickle.dumps(Calls()))
+    with pytest.raises(core.PointCloudError, match="no part of a state"):
+        store.state("measure", 0)
+    assert not (tmp_path / "called").exists()
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 1000])
+def test_medians_of_parts_are_those_of_all(count):
+    values = np.random.default_rng(count).lognormal(size=count)
+    assert median(lambda: np.array_split(values, 3)) == np.median(values)
