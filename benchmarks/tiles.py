@@ -1,10 +1,17 @@
 """Tiles against the whole cloud: ``python -m benchmarks.tiles [points [tiles [halo]]]``.
 
 Differences are the largest in the whole cloud, relative to the largest value, of areas and lengths to their own.
+
+``python -m benchmarks.tiles store [points [tile_points [folder]]]`` walks over tiles on disk in this process, and prints
+CPU seconds a point beside those of a cloud of 200,000, the most memory, and the bytes on disk; a folder that exists is
+gone on with.
 """
 
+import resource
 import sys
+import tempfile
 import time
+from pathlib import Path
 
 import numpy as np
 from scipy import sparse
@@ -14,6 +21,7 @@ import core
 from .samplings import torus_points
 
 TARGET = {"random": 1e-6, "noisy": 1e-5}
+WHOLE = 200_000  # points of the cloud that CPU seconds are held against
 NOISE = 0.2  # of the spacing
 VALUES = ("normals", "quadric_mean_curvature", "smoothing_lengths", "areas", "boundary")
 
@@ -69,5 +77,53 @@ def main(count=400_000, tiles=8, halo=core.tiles.HALO):
     compare("noisy", points + noise, int(tiles), float(halo))
 
 
+def store(count=1_000_000, most=250_000, folder=""):
+    """Measure what tiles on disk cost."""
+    count, most = int(count), int(most)
+    with tempfile.TemporaryDirectory() as temporary:
+        place = Path(folder or temporary) / "store"
+        began = time.process_time()
+        if not place.exists():
+            parts = np.array_split(torus_points(count), -(-count // 1_000_000))
+            began = time.process_time()
+            core.tiles.cut_to_store(lambda: ((part, {}) for part in parts), place, most)
+            del parts
+        cut = time.process_time() - began
+        tiles = core.tiles.Store(place)
+        disk, last, spent = 0, "", {}
+
+        def progress(step, fraction):
+            nonlocal disk, last, began
+            now = time.process_time()
+            spent[last], began = spent.get(last, 0.0) + now - began, now
+            last = step
+            disk = max(disk, sum(path.stat().st_size for path in place.rglob("*.*")))
+
+        began = time.process_time()
+        core.tiles.run_steps(tiles, progress=progress)
+        spent[last] = spent.get(last, 0.0) + time.process_time() - began
+        within = sum(len(tiles.own(number)) for number in tiles.alive)
+        around = sum(len(tiles.part(number).points) for number in tiles.alive)
+        final = sum(path.stat().st_size for path in place.rglob("*.*"))
+    seconds = cut + sum(spent.values())
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+    print(f"{count:,} points in {tiles.count} tiles, with halos {around / within:.2f} times as many")
+    print("  CPU seconds: " + ", ".join(f"{name} {value:.1f}" for name, value in {"cut": cut, **spent}.items() if name))
+    print(
+        f"  most memory {memory:.2f} GB, most on disk {disk / count:.0f} bytes a point, at the end {final / count:.0f}"
+    )
+    points = torus_points(WHOLE)
+    began = time.process_time()
+    core.mean_curvature(core.build_laplacian(points))
+    whole = time.process_time() - began
+    print(
+        f"  CPU microseconds a point: tiles {1e6 * seconds / count:.0f}, whole of {WHOLE:,} {1e6 * whole / WHOLE:.0f},"
+        f" ratio {seconds / count * WHOLE / whole:.2f} (target 1.6)"
+    )
+
+
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    if sys.argv[1:2] == ["store"]:
+        store(*sys.argv[2:])
+    else:
+        main(*sys.argv[1:])

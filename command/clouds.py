@@ -140,18 +140,28 @@ def write(path, given, results, arrays=None) -> list:
         named = {name.removeprefix(PREFIX): values for name, values in results.items()}
         save_arrays(path, {"points": points, **named} if arrays is None else arrays)
         return []
-    results = {name: _narrow(values) for name, values in results.items()}
     if splats:
         if path.suffix.lower() != ".ply":
             raise core.PointCloudError(f"Splats cannot be written to {path}. Let its name end in .ply.")
-        core.write_splats(path, with_columns(given, results))
+        core.write_splats(path, with_columns(given, {name: _narrow(values) for name, values in results.items()}))
         return []
-    attributes = {**given.attributes, **results}
+    return core.files.write_points(path, with_results(given, results), double=not given.single)
+
+
+def with_results(given, results):
+    """Return a table with results as further columns, in single precision; normals under the name that files have.
+
+    Parameters
+    ----------
+    given : PointTable
+    results : dict of str to ndarray
+        By the names of attributes.
+    """
+    attributes = {**given.attributes, **{name: _narrow(values) for name, values in results.items()}}
     if NORMAL in results:
         attributes.pop(_FILE_NORMAL, None)
         attributes[_FILE_NORMAL] = attributes.pop(NORMAL)
-    table = replace(given, attributes=attributes)
-    return core.files.write_points(path, table, double=not given.single)
+    return replace(given, attributes=attributes)
 
 
 def _narrow(values):

@@ -34,12 +34,17 @@ def add_files(parser, verb):
 
 def add_choices(parser):
     """Add the options for what is read of files."""
+    add_las_choices(parser)
     parser.add_argument(
         "--columns",
         default="",
         metavar="NAMES",
         help='names of the columns of text files, such as "x y z - r g b"; else those found',
     )
+
+
+def add_las_choices(parser):
+    """Add the options for what is read of LAS files."""
     parser.add_argument(
         "--classes", default="", metavar="NUMBERS", help='classes of LAS files to read, such as "2 5"; else all'
     )

@@ -88,6 +88,8 @@ def _parse(argv, verbs, program):
         add_files(parsers[verb.name], verb)
         add_report(parsers[verb.name])
         verb.add_options(parsers[verb.name])
+    if " ".join(argv[:2]) in parsers:  # a verb of two words
+        argv = [" ".join(argv[:2]), *argv[2:]]
     arguments = parser.parse_args(argv)
     chosen = parsers[arguments.command]
     verb = next(verb for verb in verbs if verb.name == arguments.command)

@@ -4,11 +4,12 @@ from .digits import Digits, join_digits, split_digits
 from .formats import READABLE, SCANS, SPLATS, TEXTS, WRITABLE, precision_notices, read_points, reading, write_points
 from .frames import frame_number, numbered_files, order_frames
 from .las_choices import LasChoices, parse_classes
+from .las_writing import LASER_FILES, write_las
 from .lines import brief
 from .mesh import MESHES, write_mesh
 from .origin import choose_origin, is_coarse
 from .pieces import Chunks, Extent, chunks, extent, has_levels, join_pieces
 from .ply import PlyVertices, read_elements, read_vertex_columns, read_vertex_names, write_vertex_columns
 from .rows import unpacks_too_far
-from .table import FARTHEST, SCANNER, PointTable, check_places, split_columns, unit_colors
+from .table import CHANNELS, FARTHEST, SCANNER, PointTable, check_places, full_color, split_columns, unit_colors
 from .whole import replacing

@@ -1,0 +1,287 @@
+"""The verbs for clouds larger than memory: `tiles run`, and its stages one by one."""
+
+import argparse
+import json
+import time
+from pathlib import Path
+
+from . import core, tile_work
+from .inputs import add_las_choices, las_choices
+from .records import SUFFIX
+from .rows import TABLES, write_rows, write_text
+from .settings import LAPLACIAN, add_setting, chosen
+from .stages import ToldStages
+from .tile_work import STORE
+from .verb import ONE_LINE, Verb
+
+_SETTINGS = [LAPLACIAN[name] for name in core.LaplacianOptions.__dataclass_fields__]
+_FORMATS = (".ply", ".laz", ".las", ".csv", ".xyz", ".npy")
+_REPORT = f"tiles{SUFFIX}"  # in the folder of a run
+
+
+class _TileVerb(Verb):
+    """A verb for tiles; what it says of itself is in full by its help."""
+
+    @property
+    def description(self):
+        """What it does, in full."""
+        return f"{self.help[0].upper()}{self.help[1:]}. {ONE_LINE}"
+
+    def expand(self, path, arguments):
+        return [path]
+
+    def check(self, parser, arguments):
+        if arguments.part != (1, 1):
+            parser.error("--part divides files, not tiles: use --tiles K/N with survey and measure")
+
+
+class _Cutting(_TileVerb):
+    """A verb that cuts files into tiles: all inputs together, into one folder."""
+
+    inputs = "point clouds that are parts of one; or folders of such"
+
+    def add_options(self, parser):
+        parser.add_argument(
+            "--out-dir", dest="folder", type=Path, required=True, metavar="DIR", help="folder for the tiles and results"
+        )
+        parser.add_argument(
+            "--memory", type=_size, metavar="SIZE", help="memory of each worker, such as 2GB; else what is free"
+        )
+        parser.add_argument("--tile-points", type=int, metavar="INT", help="points of a tile; else by the memory")
+        for setting in _SETTINGS:
+            add_setting(parser, setting)
+        add_las_choices(parser)
+
+    def expand(self, path, arguments):
+        return Verb.expand(self, path, arguments)
+
+    def check(self, parser, arguments):
+        if arguments.part != (1, 1):
+            parser.error("--part would leave points out: all inputs are one cloud")
+        if arguments.tile_points is not None and arguments.tile_points < 1:
+            parser.error("--tile-points must be at least 1")
+        if chosen(_SETTINGS, arguments)["bandwidth"] == "GLOBAL":
+            parser.error("--bandwidth global is one length for the whole cloud, which tiles do not know: use adaptive")
+        arguments.sources, arguments.inputs = arguments.inputs, [arguments.folder]
+
+    def cut(self, arguments, count):
+        """Return the store of a folder, for so many workers, and the notices of what was read; cut it if need be."""
+        given = chosen(_SETTINGS, arguments)
+        options = core.LaplacianOptions(
+            **{name: value.lower() if isinstance(value, str) else value for name, value in given.items()}
+        )
+        folder, memory = arguments.folder / STORE, arguments.memory or tile_work.free_memory() // count
+        known = {"sources": [str(path.resolve()) for path in arguments.sources]}
+        if folder.exists():
+            store = core.tiles.Store(folder)
+            if (store.manifest["sources"], store.options) != (known["sources"], options):
+                raise core.PointCloudError(
+                    f"{arguments.folder} has tiles of other files or settings. Choose another folder, or delete it."
+                )
+            return store, store.manifest["notices"]
+        most = arguments.tile_points or core.tiles.points_of_tile(memory, options)
+        sources = tile_work.Sources(arguments.sources, las_choices(arguments))
+
+        def chunks():
+            yield from sources()
+            known.update({"full color": sources.full, "notices": sources.notices})
+
+        store = core.tiles.cut_to_store(chunks, folder, most, options, memory=memory, known=known)
+        return store, store.manifest["notices"]
+
+
+class TilesRun(_Cutting):
+    """The verb `tiles run`."""
+
+    name = "tiles run"
+    help = "analyze a cloud larger than memory, tile by tile; a run that was stopped goes on where it was"
+
+    def add_options(self, parser):
+        super().add_options(parser)
+        parser.add_argument("--workers", type=int, default=1, metavar="INT", help="processes on this machine")
+        parser.add_argument("--scheduler", default="", metavar="ADDRESS", help="of a Dask cluster that does the work")
+        _add_format(parser)
+
+    def check(self, parser, arguments):
+        super().check(parser, arguments)
+        if arguments.workers < 1:
+            parser.error("--workers must be at least 1")
+
+    def run(self, path, arguments, output):
+        store, notices = self.cut(arguments, arguments.workers)
+        with (
+            ToldStages(self.name) as stages,
+            tile_work.workers(arguments.workers, store.manifest["memory"], arguments.scheduler) as spread,
+        ):
+
+            def visit_all(step, numbers):
+                return spread(tile_work.visit, [(str(store.folder), step, number) for number in numbers])
+
+            core.tiles.run_steps(store, visit_all, stages)
+            _write(store, path, store.alive, arguments.tile_format, spread)
+        return {**_report(store, path, arguments.tile_format), "notices": notices}
+
+
+class TilesCut(_Cutting):
+    """The verb `tiles cut`."""
+
+    name = "tiles cut"
+    help = "cut a cloud larger than memory into tiles, the first stage"
+
+    def run(self, path, arguments, output):
+        store, notices = self.cut(arguments, 1)
+        return {"points": store.manifest["points"], "tiles": store.count, "notices": notices}
+
+
+class _Stage(_TileVerb):
+    """A stage for a folder of tiles."""
+
+    inputs = "folders with tiles, of tiles cut"
+
+    def store(self, path):
+        """Return the store in a folder."""
+        return core.tiles.Store(path / STORE)
+
+
+class TilesSurvey(_Stage):
+    """The verb `tiles survey`."""
+
+    name = "tiles survey"
+    help = "take the next step at the tiles, all or a share of them; tiles agree follows each"
+
+    def add_options(self, parser):
+        _add_share(parser)
+
+    def run(self, path, arguments, output):
+        store = self.store(path)
+        waiting = core.tiles.pending(store)
+        if waiting is None or waiting[0].name == "measure":
+            return {"step": None, "visited": 0, "waiting": 0, "notices": ["The survey is done: measure the tiles."]}
+        return {**_visit(store, waiting, arguments.tiles), "notices": []}
+
+
+class TilesAgree(_Stage):
+    """The verb `tiles agree`."""
+
+    name = "tiles agree"
+    help = "merge what the tiles have told in a step; prints the next one"
+
+    def run(self, path, arguments, output):
+        store = self.store(path)
+        waiting = core.tiles.pending(store)
+        if waiting is not None and waiting[1]:
+            raise core.PointCloudError(
+                f"{len(waiting[1])} tiles of {path} wait for the step {waiting[0].name}. Survey or measure them first."
+            )
+        core.tiles.settle(store)
+        waiting = core.tiles.pending(store)
+        return {"next": None if waiting is None else waiting[0].name, "notices": []}
+
+
+class TilesMeasure(_Stage):
+    """The verb `tiles measure`."""
+
+    name = "tiles measure"
+    help = "measure the tiles, all or a share of them, and write the results of each"
+
+    def add_options(self, parser):
+        _add_share(parser)
+        _add_format(parser)
+
+    def run(self, path, arguments, output):
+        store = self.store(path)
+        waiting, found = core.tiles.pending(store), {"step": None, "visited": 0, "waiting": 0}
+        if waiting is not None and waiting[0].name != "measure":
+            raise core.PointCloudError(f"{path} waits for the step {waiting[0].name} of the survey. Take it first.")
+        if waiting is not None:
+            found = _visit(store, waiting, arguments.tiles)
+        number, count = arguments.tiles
+        measured = [tile for tile in store.alive if store.done("measure", tile)]
+        mine = [tile for tile in measured if tile % count == number - 1]
+        _write(store, path, mine, arguments.tile_format, lambda function, many: (function(*given) for given in many))
+        return {**found, "notices": []}
+
+
+class TilesReport(_Stage):
+    """The verb `tiles report`."""
+
+    name = "tiles report"
+    help = "tell the results and errors of all tiles, and totals"
+    outputs = TABLES
+
+    def add_options(self, parser):
+        _add_format(parser, "--tile-format")
+
+    def run(self, path, arguments, output):
+        store = self.store(path)
+        found = _report(store, path, arguments.tile_format)
+        if output is not None:
+            rows = tile_work.tile_records(store, path, _suffix(arguments.tile_format))
+            names = ("tile", "file", "points", "total_area", "elapsed", "error")
+            write_rows(output, [{name: row.get(name) for name in names} for row in rows])
+        return {**found, "notices": []}
+
+
+def _visit(store, waiting, share):
+    """Take a step at a share of the tiles that wait for it."""
+    step, numbers = waiting
+    mine = [number for number in numbers if number % share[1] == share[0] - 1]
+    for number in mine:
+        core.tiles.visit_tile(store.folder, step.name, number)
+    return {"step": step.name, "visited": len(mine), "waiting": len(numbers) - len(mine)}
+
+
+def _write(store, folder, numbers, form, spread):
+    """Write the results of some tiles."""
+    suffix = _suffix(form)
+    if not suffix:
+        return
+    many = [(str(store.folder), number, str(tile_work.tile_path(folder, number, suffix))) for number in numbers]
+    for _ in spread(tile_work.write_tile, many):
+        pass
+
+
+def _report(store, folder, form):
+    """Write the report of all tiles, a line of JSON for each, and return the totals with the errors."""
+    records = tile_work.tile_records(store, folder, _suffix(form))
+    shared = {"verb": "tiles run", "settings": store.manifest["options"], "stamps": {}, "ended": round(time.time(), 3)}
+    lines = [{"path": record["file"], **shared, **record} for record in records]
+    write_text(folder / _REPORT, "".join(f"{json.dumps(line)}\n" for line in lines))
+    errors = [{"tile": record["tile"], "error": record["error"]} for record in records if "error" in record]
+    return {**tile_work.totals(store, records), "errors": errors}
+
+
+def _suffix(form):
+    """Return the ending of results in files; none where they stay in the store as .npz."""
+    return "" if form == "npy" else f".{form}"
+
+
+def _add_share(parser):
+    parser.add_argument(
+        "--tiles", type=_share, default=(1, 1), metavar="K/N", help="take the K-th of N equal shares of the tiles only"
+    )
+
+
+def _add_format(parser, name="--format"):
+    endings = [suffix[1:] for suffix in _FORMATS]
+    parser.add_argument(
+        name,
+        dest="tile_format",
+        choices=endings,
+        default=endings[0],
+        help="results of each tile; npy leaves them in the store only, where they are as arrays in any case",
+    )
+
+
+def _share(text):
+    number, _, count = text.partition("/")
+    if not (number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count)):
+        raise argparse.ArgumentTypeError(f"{text!r} is not K/N, such as 1/4, with K from 1 to N")
+    return int(number), int(count)
+
+
+def _size(text):
+    try:
+        return tile_work.bytes_of(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error

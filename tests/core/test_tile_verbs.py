@@ -1,0 +1,150 @@
+"""The verbs for clouds larger than memory: from files to files of results, in one go or stage by stage."""
+
+import json
+
+import numpy as np
+import pytest
+
+import core
+from command import tile_work, verbs
+from command.main import run as run_command
+from core.files import PointTable, read_points, write_points
+
+LENGTH, RADIUS, COUNT = 10.0, 0.25, 2400
+OPTIONS = ("--tile-points", 1300)
+
+
+@pytest.fixture
+def run(capsys):
+    """Run the command line; return the exit code and the JSON lines."""
+
+    def run(*arguments):
+        code = run_command([str(argument) for argument in arguments], verbs.make_verbs(), "meshfree")
+        return code, [json.loads(line) for line in capsys.readouterr().out.splitlines() if line.startswith("{")]
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def scans(tmp_path_factory):
+    """Two halves of a rod, with classes and colors."""
+    folder = tmp_path_factory.mktemp("scans")
+    rng = np.random.default_rng(0)
+    angle, along = rng.uniform(0.0, 2.0 * np.pi, COUNT), rng.uniform(0.0, LENGTH, COUNT)
+    points = np.column_stack([along, RADIUS * np.cos(angle), RADIUS * np.sin(angle)])
+    for name, half in (("a", along < 0.5 * LENGTH), ("b", along >= 0.5 * LENGTH)):
+        colors = np.ones((np.count_nonzero(half), 4), np.float32)
+        colors[:, 0] = 0.2 if name == "a" else 1.0
+        classes = {"classification": np.full(len(colors), 2 + (name == "b"), np.uint8)}
+        write_points(folder / f"{name}.ply", PointTable(points[half], classes, colors))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def done(scans, tmp_path_factory):
+    """Folder of a run over both."""
+    folder = tmp_path_factory.mktemp("done") / "out"
+    arguments = ["tiles", "run", scans, "--out-dir", folder, *OPTIONS, "--format", "laz", "--memory", "4GB"]
+    assert run_command(list(map(str, arguments)), verbs.make_verbs(), "meshfree") == 0
+    return folder
+
+
+class TestRun:
+    def test_writes_results_and_columns_of_each_tile(self, scans, done):
+        tables = [read_points(path) for path in sorted(done.glob("tile_*.laz"))]
+        assert len(tables) == 2
+        assert sum(len(table.points) for table in tables) == COUNT
+        area = sum(table.attributes["lb_area"].astype(float).sum() for table in tables)
+        points = np.concatenate([read_points(scans / f"{name}.ply").points for name in "ab"])
+        whole = core.build_laplacian(points, agreed=core.geometry.Agreed(degree=24))
+        assert abs(area / whole.areas.sum() - 1.0) < 1e-6
+        for table in tables:
+            half = table.points[:, 0] >= 0.5 * LENGTH
+            np.testing.assert_array_equal(table.attributes["classification"], 2 + half)
+            np.testing.assert_allclose(table.colors[:, 0], np.where(half, 1.0, 0.2), atol=1e-2)
+            normal = np.column_stack([table.attributes[f"n{axis}"] for axis in "xyz"])
+            assert np.all(np.einsum("ij,ij->i", normal[:, 1:], table.points[:, 1:]) > 0.0)
+            assert set(table.attributes) >= {"lb_mean_curvature", "lb_boundary", "lb_component", "lb_trust"}
+
+    def test_again_does_nothing_but_tell(self, run, scans, done):
+        before = {path: path.stat().st_mtime_ns for path in done.rglob("*.*") if path.name != "tiles.jsonl"}
+        code, [line] = run("tiles", "run", scans, "--out-dir", done, *OPTIONS, "--format", "laz")
+        assert (code, line["points"], line["tiles"], line["component_count"]) == (0, COUNT, 2, 1)
+        assert {path: path.stat().st_mtime_ns for path in before} == before
+
+    def test_its_report_is_one_of_files(self, run, done):
+        code, [line] = run("report", done)
+        assert code == 0
+        assert (line["files"], line["failed"], line["points"]) == (2, 0, COUNT)
+
+    def test_other_files_or_settings_need_another_folder(self, run, scans, done):
+        for arguments in ((scans / "a.ply",), (scans, "--boundary", "off")):
+            code, [line] = run("tiles", "run", *arguments, "--out-dir", done)
+            assert (code, "other files or settings" in line["error"]) == (1, True)
+
+    def test_several_workers_need_dask(self, scans, done, monkeypatch):
+        monkeypatch.setitem(__import__("sys").modules, "distributed", None)
+        with pytest.raises(core.PointCloudError, match="Dask"), tile_work.workers(2, 1 << 30, ""):
+            pass
+
+    @pytest.mark.parametrize(
+        "wrong",
+        [("--workers", "0"), ("--memory", "much"), ("--part", "1/2"), ("--bandwidth", "global"), ("--tile-points", 0)],
+    )
+    def test_wrong_usage(self, run, scans, tmp_path, wrong):
+        assert run("tiles", "run", scans, "--out-dir", tmp_path / "out", *wrong) == (2, [])
+
+    def test_too_little_memory_is_for_another_machine(self, run, scans, tmp_path):
+        code, [line] = run("tiles", "run", scans, "--out-dir", tmp_path / "out", "--memory", "100MB")
+        assert (code, "GB are allowed" in line["error"]) == (3, True)
+
+
+def test_stages_give_the_same_to_the_bit(run, scans, done, tmp_path):
+    out = tmp_path / "out"
+    assert run("tiles", "cut", scans, "--out-dir", out, *OPTIONS, "--memory", "4GB")[1][0]["tiles"] == 2
+    steps = []
+    while run("tiles", "agree", out)[1][0].get("next") != "measure":
+        for share in ("1/2", "2/2"):
+            code, [line] = run("tiles", "survey", out, "--tiles", share)
+            assert (code, line["visited"] <= 1) == (0, True)
+        steps.append(line["step"])
+    assert steps[0] == "extent"
+    assert steps[-1] == "shares"
+    assert run("tiles", "measure", out, "--tiles", "1/2", "--format", "npy")[1][0]["waiting"] == 1
+    assert "wait for the step measure" in run("tiles", "agree", out)[1][0]["error"]
+    run("tiles", "measure", out, "--tiles", "2/2", "--format", "npy")
+    assert run("tiles", "agree", out)[1][0]["next"] is None
+    first, second = (core.tiles.Store(folder / "store") for folder in (done, out))
+    for number in range(2):
+        for name in ("areas", "normals", "mean_curvature"):
+            np.testing.assert_array_equal(second.read("measure", number, name), first.read("measure", number, name))
+    code, [line] = run("tiles", "report", out, "--out", tmp_path / "table.csv")
+    assert (code, line["measured_points"], line["errors"]) == (0, COUNT, [])
+    assert len((tmp_path / "table.csv").read_text().splitlines()) == 3
+
+
+def test_stages_in_a_wrong_order_are_told(run, scans, tmp_path):
+    assert "holds no tiles" in run("tiles", "survey", tmp_path)[1][0]["error"]
+    run("tiles", "cut", scans, "--out-dir", tmp_path / "out", *OPTIONS)
+    assert "waits for the step extent" in run("tiles", "measure", tmp_path / "out")[1][0]["error"]
+
+
+def test_a_broken_tile_is_told_and_the_others_written(run, scans, tmp_path):
+    out = tmp_path / "out"
+    run("tiles", "cut", scans, "--out-dir", out, *OPTIONS)
+    np.save(out / "store" / "000001" / "points.npy", 1e3 + 1e-3 * np.eye(3))
+    code, [line] = run("tiles", "run", scans, "--out-dir", out, *OPTIONS)
+    assert (code, line["failed_tiles"], line["errors"][0]["tile"]) == (0, 1, 1)
+    assert [path.name for path in out.glob("tile_*")] == ["tile_000000.ply"]
+    assert run("report", out)[1][0]["failed"] == 1
+
+
+@pytest.mark.parametrize(("text", "size"), [("2GB", 2 << 30), ("1.5 mb", 3 << 19), ("700", 700), ("1KB", 1024)])
+def test_sizes(text, size):
+    assert tile_work.bytes_of(text) == size
+
+
+@pytest.mark.parametrize("text", ["", "GB", "-1GB", "nanGB", "0"])
+def test_no_sizes(text):
+    with pytest.raises(ValueError, match="size"):
+        tile_work.bytes_of(text)
