@@ -2,9 +2,9 @@
 
 Differences are the largest in the whole cloud, relative to the largest value, of areas and lengths to their own.
 
-``python -m benchmarks.tiles store [points [tile_points [folder]]]`` walks over tiles on disk in this process, and prints
-CPU seconds a point beside those of a cloud of 200,000, the most memory, and the bytes on disk; a folder that exists is
-gone on with.
+``python -m benchmarks.tiles store [points [tile_points [folder]]]`` walks over tiles on disk in this process, and
+prints CPU seconds a point beside those of a cloud of 200,000, the most memory, and the bytes on disk; a folder that
+exists is gone on with.
 """
 
 import resource
@@ -108,10 +108,8 @@ def store(count=1_000_000, most=250_000, folder=""):
     seconds = cut + sum(spent.values())
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     print(f"{count:,} points in {tiles.count} tiles, with halos {around / within:.2f} times as many")
-    print("  CPU seconds: " + ", ".join(f"{name} {value:.1f}" for name, value in {"cut": cut, **spent}.items() if name))
-    print(
-        f"  most memory {memory:.2f} GB, most on disk {disk / count:.0f} bytes a point, at the end {final / count:.0f}"
-    )
+    print("  CPU seconds:", ", ".join(f"{name} {value:.1f}" for name, value in {"cut": cut, **spent}.items() if name))
+    print(f"  most memory {memory:.2f} GB, on disk {disk / count:.0f} bytes a point, at the end {final / count:.0f}")
     points = torus_points(WHOLE)
     began = time.process_time()
     core.mean_curvature(core.build_laplacian(points))

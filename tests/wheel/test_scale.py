@@ -1,0 +1,73 @@
+"""Clouds larger than memory on several workers: the installed program with Dask, and a worker killed in the middle."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import psutil
+import pytest
+
+from .conftest import call, site
+
+CODE = "import sys; from meshfree_laplacian.command.main import main; sys.exit(main())"
+LENGTH, RADIUS, COUNT = 12.0, 0.125, 4000
+OPTIONS = ("--tile-points", 700, "--memory", "2GB", "--format", "npy")
+KILLED_AFTER = "agreed-spacing.npz"  # what is there when a worker is killed
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with points of a rod."""
+    folder = tmp_path_factory.mktemp("rod")
+    rng = np.random.default_rng(0)
+    angle, along = rng.uniform(0.0, 2.0 * np.pi, COUNT), rng.uniform(0.0, LENGTH, COUNT)
+    np.save(folder / "rod.npy", np.column_stack([along, RADIUS * np.cos(angle), RADIUS * np.sin(angle)]))
+    return folder
+
+
+def measured(store):
+    """Return all results in a store, by file and name."""
+    found = {}
+    for path in sorted(store.rglob("measure.npz")):
+        with np.load(path) as arrays:
+            found |= {(path.parent.name, name): arrays[name] for name in arrays.files if name != "seconds"}
+    return found
+
+
+def command(out, workers):
+    return [sys.executable, "-c", CODE, *map(str, ("tiles", "run", "rod.npy", "--out-dir", out, "--workers", workers)),
+            *map(str, OPTIONS)]  # fmt: skip
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL there")
+def test_a_killed_worker_changes_nothing(place, folder):
+    known = {"PYTHONPATH": str(site(place)), "OPENBLAS_NUM_THREADS": "1"}
+    line = json.loads(call(*command("alone", 1), cwd=folder, env=known))
+    assert (line["points"], line["failed_tiles"], line["tiles"]) == (COUNT, 0, 6)
+    running = subprocess.Popen(
+        command("together", 2), cwd=folder, env={**os.environ, **known}, stdout=subprocess.PIPE, text=True
+    )
+    try:
+        store = folder / "together" / "store"
+        while not (store / KILLED_AFTER).exists():
+            assert running.poll() is None
+            time.sleep(0.02)
+        workers = [one for one in psutil.Process(running.pid).children() if "spawn_main" in " ".join(one.cmdline())]
+        assert len(workers) == 2
+        workers[0].send_signal(signal.SIGKILL)
+        printed, _ = running.communicate(timeout=250)
+    finally:
+        running.kill()
+    assert running.returncode == 0
+    assert json.loads(printed.splitlines()[-1])["total_area"] == line["total_area"]
+    first, second = measured(folder / "alone" / "store"), measured(store)
+    assert first.keys() == second.keys()
+    assert len(first) > 60
+    for key, values in first.items():
+        np.testing.assert_array_equal(second[key], values)
+    assert not list(store.rglob(".*"))
+    assert not list(store.rglob("state-*"))
