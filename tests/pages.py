@@ -14,6 +14,7 @@ _TYPED = re.compile(rf"{_SHELL}|bpy\.ops\.\w+\..*")
 
 FARM = "needs a scheduler; tests/wheel/test_farm.py runs it on other files"
 SERVER = "needs a server; tests/gui/test_repository.py runs it with one"
+DASK = "needs a cluster; tests/wheel/test_scale.py runs it on workers of its own"
 SLOW = "takes minutes to hours; test_pages.py of the core looks for the module"
 NOT_RUN = {
     "blender --command meshfree analyze IN [IN ...] --out FILE | --out-dir DIR [--modes N] [--format FORMAT]": "a form",
@@ -26,6 +27,9 @@ NOT_RUN = {
     "blender --online-mode --command extension repo-add --name Studio --url https://server/index.json studio": SERVER,
     "blender --online-mode --command extension install --sync --enable studio.meshfree_laplacian": SERVER,
     "blender --online-mode --command extension update --sync": SERVER,
+    "pip install meshfree-laplacian[scale]": "changes the environment, from the internet",
+    "meshfree tiles run scans --out-dir out --workers 8 --memory 4GB": DASK,
+    "meshfree tiles run scans --out-dir out --scheduler tcp://head:8786 --memory 4GB": DASK,
     "pip install laspy lazrs": "changes the environment, from the internet",
     "pip install open3d==0.19.0": "changes the environment, from the internet",
     "pip install open3d==0.20.0": "changes the environment, from the internet",

@@ -8,14 +8,15 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
 
-from ..types import Array, Floats, Ints
+from ..geometry import ScaledPoints, label_connected
+from ..types import Array, Bools, Floats, Ints
 
 if TYPE_CHECKING:
     from .shelf import Record, Shelf, Told
     from .site import Site
 
 
-def label_links(site: Site, scaled: Any, first: Ints, second: Ints) -> Told:
+def label_links(site: Site, scaled: ScaledPoints, index: Ints, joined: Bools) -> Told:
     """Number what links from points in the box of a tile join, within it.
 
     Parameters
@@ -23,8 +24,10 @@ def label_links(site: Site, scaled: Any, first: Ints, second: Ints) -> Told:
     site : Site
     scaled : ScaledPoints
         The m distinct points.
-    first, second : ndarray, (k,) int
-        Links, from points in the box to others.
+    index : ndarray, (m, k) int
+        Neighbours of each.
+    joined : ndarray, (m, k) bool
+        Those that links lead to; what is said of points outside the box is left to their tiles.
 
     Returns
     -------
@@ -33,10 +36,10 @@ def label_links(site: Site, scaled: Any, first: Ints, second: Ints) -> Told:
         reach the tile that they belong to, their places in it, and their labels here.
     """
     part, count, inner = site.part, len(scaled.points), site.inner(scaled)
-    graph = sparse.csr_array((np.ones(len(first), dtype=bool), (first, second)), shape=(count, count))
-    label = connected_components(graph, directed=False)[1]
+    joined = joined & inner[:, None]
+    label = label_connected(index, joined)
     reached = np.zeros(count, dtype=bool)
-    reached[second] = True
+    reached[index[joined]] = True
     reached &= ~inner
     used = inner | reached
     names, number = np.unique(label[used], return_inverse=True)

@@ -11,7 +11,6 @@ from scipy import sparse
 from ..geometry import (
     Cloud,
     Decisions,
-    Surface,
     arc_length,
     measure_surface,
     mirrored_cosine,
@@ -24,20 +23,12 @@ from ..operator import LaplaceBeltrami, assemble_laplacian, build_laplacian, mea
 from ..options import LaplacianOptions
 from ..types import Array, Floats, Ints
 from .labels import agree_on_signs
-from .neighborhoods import divided
+from .neighborhoods import Fitted, divided
 from .shelf import Part, Record, Shelf, Told
 from .site import Site
 
 _LINK = 1e-3  # weight of links between patches of one tile, against points that two tiles have in common
 _TRIAL = 8000  # points on which the weights are balanced, for the shares
-
-
-class Oriented(NamedTuple):
-    """A surface, normals that agree within patches, (m, 3), and the patch of each point, (m,)."""
-
-    surface: Surface
-    normals: Floats
-    patch: Ints
 
 
 class Solved(NamedTuple):
@@ -47,9 +38,9 @@ class Solved(NamedTuple):
     areas: Floats
 
 
-def orient_tile(site: Site, surface: Surface) -> tuple[Oriented, Told]:
+def orient_tile(site: Site, fitted: Fitted) -> tuple[Fitted | None, Told]:
     """Divide sheets, and orient the patches of a tile."""
-    surface = divided(site, surface)
+    surface, changed = divided(site, fitted)
     nearest, scaled = surface.sample.nearest, surface.sample.scaled
     normals, patch = orient_patches(nearest, surface.quadrics.normals, surface.sample.places)
     first, second = near_edges(nearest)
@@ -57,25 +48,25 @@ def orient_tile(site: Site, surface: Surface) -> tuple[Oriented, Told]:
     count = int(patch.max()) + 1
     votes = sparse.coo_array((alike, (patch[first], patch[second])), shape=(count, count)).tocsr().tocoo()
     across = votes.row != votes.col
-    return Oriented(surface, normals, patch), {
+    return Fitted(surface) if changed else None, {
         "normal": site.own(scaled, normals, 0.0),
         "patch": site.own(scaled, patch, -1),
-        "patches": np.array(count),
+        "normals": normals,  # of all distinct points, with the halo
+        "patches": patch,
+        "count": np.array(count),
         "links": np.stack([votes.row, votes.col], axis=1)[across],
         "votes": votes.data[across],
     }
 
 
-def compare_sides(site: Site, oriented: Oriented) -> tuple[None, Told]:
+def compare_sides(site: Site, fitted: Fitted) -> tuple[None, Told]:
     """Compare the sides of patches with those of the tiles around."""
-    part, first = site.part, oriented.surface.sample.scaled.first
-    owner = part.owner[first]
-    theirs, normals = site.around("patches", "patch", -1)[first], site.around("patches", "normal", 0.0)[first]
+    part, first = site.part, fitted.surface.sample.scaled.first
+    owner, normals, patch = part.owner[first], site.told("patches", "normals"), site.told("patches", "patches")
+    theirs, beside = site.around("patches", "patch", -1)[first], site.around("patches", "normal", 0.0)[first]
     common = (part.close & ~part.inner)[first] & (theirs >= 0)
-    alike = np.sign(np.einsum("ij,ij->i", oriented.normals, normals))[common]
-    kinds, kind = np.unique(
-        np.stack([oriented.patch[common], owner[common], theirs[common]]), axis=1, return_inverse=True
-    )
+    alike = np.sign(np.einsum("ij,ij->i", normals, beside))[common]
+    kinds, kind = np.unique(np.stack([patch[common], owner[common], theirs[common]]), axis=1, return_inverse=True)
     return None, {"pairs": kinds.T, "votes": np.bincount(kind.reshape(-1), alike, kinds.shape[1])}
 
 
@@ -83,7 +74,7 @@ def agree_on_flips(shelf: Shelf, options: LaplacianOptions) -> Record:
     """Agree on which patches are reversed, so that all agree."""
     alive = [number for number in shelf.alive if shelf.done("sides", number)]
     counts = np.zeros(max(alive) + 2, dtype=np.int64)
-    counts[np.array(alive) + 1] = [int(count) for count in shelf.told("patches", "patches")]
+    counts[np.array(alive) + 1] = [int(count) for count in shelf.told("patches", "count")]
     start = np.cumsum(counts)
     votes: list[Array] = []
     for number in alive:
@@ -96,16 +87,15 @@ def agree_on_flips(shelf: Shelf, options: LaplacianOptions) -> Record:
     return {"flip": sign, "flip start": start}
 
 
-def tell_sides(site: Site, oriented: Oriented) -> tuple[Surface, Told]:
+def tell_sides(site: Site, fitted: Fitted) -> tuple[None, Told]:
     """Reverse patches, and sum up what tells the outer side of each component."""
-    record, scaled = site.record, oriented.surface.sample.scaled
+    record, sample = site.record, fitted.surface.sample
     begin = int(record["flip start"][site.number])
-    side = oriented.normals * record["flip"][begin + oriented.patch, None]
-    rows = np.flatnonzero(site.inner(scaled))
-    names, label = np.unique(site.labels()[scaled.first[rows]], return_inverse=True)
-    places, weight = oriented.surface.sample.places[rows], np.ones(len(rows))
-    sums = side_sums(places, side[rows], label.reshape(-1), weight) if len(rows) else np.zeros((0, 10))
-    return oriented.surface, {"side": site.own(scaled, side, 0.0), "name": names, "sums": sums}
+    side = site.told("patches", "normals") * record["flip"][begin + site.told("patches", "patches"), None]
+    rows = np.flatnonzero(site.inner(sample.scaled))
+    names, label = np.unique(site.labels()[sample.scaled.first[rows]], return_inverse=True)
+    sums = side_sums(sample.places[rows], side[rows], label.reshape(-1), np.ones(len(rows)))
+    return None, {"side": site.own(sample.scaled, side, 0.0), "name": names, "sums": sums}
 
 
 def agree_on_outside(shelf: Shelf, options: LaplacianOptions) -> Record:
@@ -113,13 +103,13 @@ def agree_on_outside(shelf: Shelf, options: LaplacianOptions) -> Record:
     return {"outer": signs_by_sums(_added(shelf, "outside", "sums"))}
 
 
-def find_areas(site: Site, surface: Surface) -> tuple[Solved, Told]:
+def find_areas(site: Site, fitted: Fitted) -> tuple[Solved, Told]:
     """Go on to pairs, and solve for areas."""
     agreed = replace(site.agreed(), ratio=np.ones(int(site.labels().max(initial=0)) + 1))
-    sample = surface.sample
+    sample = fitted.surface.sample
     decisions = Decisions(agreed)
     counts = len(site.part.points), int(site.told("spacing", "distinct"))
-    cloud = measure_surface(replace(surface, sample=replace(sample, decisions=decisions)), site.options, counts)
+    cloud = measure_surface(replace(fitted.surface, sample=replace(sample, decisions=decisions)), site.options, counts)
     distance = arc_length(cloud)
     areas = solve_areas(cloud, distance)
     cloud = replace(cloud, pairs=replace(cloud.pairs, distance=distance))

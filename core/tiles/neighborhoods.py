@@ -41,10 +41,10 @@ from .site import Site
 
 
 class Fitted(NamedTuple):
-    """A surface, and what quadrics through 20 neighbours miss these by, (m,); None where noise is not looked for."""
+    """A surface, and what quadrics through 20 neighbours miss these by, (m,), until noise is smoothed."""
 
     surface: Surface
-    near: Floats | None
+    near: Floats | None = None
 
 
 def find_spacing(site: Site, state: Any) -> tuple[Sample, Told]:
@@ -77,8 +77,7 @@ def agree_on_reach(shelf: Shelf, options: LaplacianOptions) -> Record:
 def link_strictly(site: Site, sample: Sample) -> tuple[None, Told]:
     """Join neighbours over edges that are no gaps."""
     strict, _ = find_gaps(sample.nearest, float(site.record["reach"]))
-    row, column = np.nonzero(strict & site.inner(sample.scaled)[:, None])
-    return None, label_links(site, sample.scaled, row, sample.nearest.index[row, 1 + column])
+    return None, label_links(site, sample.scaled, sample.nearest.index[:, 1:], strict)
 
 
 def agree_on_large(shelf: Shelf, options: LaplacianOptions) -> Record:
@@ -91,10 +90,8 @@ def link_loosely(site: Site, sample: Sample) -> tuple[None, Told]:
     """Join components of some size over wider edges."""
     strict, loose = find_gaps(sample.nearest, float(site.record["reach"]))
     large = site.named("gaps", "large", False)[sample.scaled.first]
-    strict |= loose & large[:, None] & large[sample.nearest.index[:, 1:]]
-    inner = site.inner(sample.scaled)
-    row, column = np.nonzero(strict & inner[:, None])
-    told = label_links(site, sample.scaled, row, sample.nearest.index[row, 1 + column])
+    index = sample.nearest.index[:, 1:]
+    told = label_links(site, sample.scaled, index, strict | (loose & large[:, None] & large[index]))
     many = np.zeros(len(told["size"]), dtype=bool)
     own = told["label"]
     many[own[own >= 0]] = large[sample.scaled.inverse[site.part.inner][own >= 0]]
@@ -148,10 +145,12 @@ def agree_on_filling(shelf: Shelf, options: LaplacianOptions) -> Record:
     return {"filling": told[0]} if told else {}
 
 
-def link_sheets(site: Site, fitted: Fitted) -> tuple[Surface, Told]:
+def link_sheets(site: Site, fitted: Fitted) -> tuple[Fitted | None, Told]:
     """Smooth noise, and join neighbours on sheets."""
-    surface = remove_noise(_with_decisions(site, fitted.surface), site.options, fitted.near)
-    return surface, _link_neighbors(site, surface, surface.quadrics.normals, False) if site.options.sheets else {}
+    given = _with_decisions(site, fitted.surface)
+    surface = remove_noise(given, site.options, fitted.near)
+    told = _link_neighbors(site, surface, surface.quadrics.normals, False) if site.options.sheets else {}
+    return None if surface is given else Fitted(surface), told
 
 
 def agree_on_large_sheets(shelf: Shelf, options: LaplacianOptions) -> Record:
@@ -162,9 +161,9 @@ def agree_on_large_sheets(shelf: Shelf, options: LaplacianOptions) -> Record:
     return names_of("sheets", "large sheet", merged.start, number_sizes(merged.size, COUNT)[merged.label])
 
 
-def join_sheets(site: Site, surface: Surface) -> tuple[None, Told]:
+def join_sheets(site: Site, fitted: Fitted) -> tuple[None, Told]:
     """Join small sheets to those that they touch, and tell which sheets there are of which components."""
-    sample = surface.sample
+    sample = fitted.surface.sample
     sheet = join_touching(sample.nearest, site.named("sheets", "large sheet")[sample.scaled.first])
     component = site.named("components", "component")[sample.scaled.first]
     inner = site.inner(sample.scaled)
@@ -189,8 +188,9 @@ def agree_on_sheets(shelf: Shelf, options: LaplacianOptions) -> Record:
     return names_of("touching", "sheet", np.cumsum(counts), number_sizes(size, 0)[label])
 
 
-def link_pieces(site: Site, surface: Surface) -> tuple[None, Told]:
+def link_pieces(site: Site, fitted: Fitted) -> tuple[None, Told]:
     """Join neighbours on the same side of sheets."""
+    surface = fitted.surface
     return None, _link_neighbors(site, surface, site.sides()[surface.sample.scaled.first], True)
 
 
@@ -200,8 +200,9 @@ def agree_on_pieces(shelf: Shelf, options: LaplacianOptions) -> Record:
     return names_of("pieces", "piece", merged.start, merged.label)
 
 
-def find_bridges(site: Site, surface: Surface) -> tuple[None, Told]:
+def find_bridges(site: Site, fitted: Fitted) -> tuple[None, Told]:
     """Find the shortest edges between pieces."""
+    surface = fitted.surface
     nearest, first = surface.sample.nearest, surface.sample.scaled.first
     piece = site.named("pieces", "piece")[first]
     inner = site.inner(surface.sample.scaled)
@@ -225,10 +226,11 @@ def agree_on_bridges(shelf: Shelf, options: LaplacianOptions) -> Record:
     return {"bridges": bridges}
 
 
-def divided(site: Site, surface: Surface) -> Surface:
-    """Return the surface of a tile, divided into sheets, if the options ask for it."""
-    surface = _with_decisions(site, surface)
-    return divide_sheets(surface, site.needed) if site.options.sheets else surface
+def divided(site: Site, fitted: Fitted) -> tuple[Surface, bool]:
+    """Return the surface of a tile, divided into sheets if the options ask for it, and whether that is another one."""
+    given = _with_decisions(site, fitted.surface)
+    surface = divide_sheets(given, site.needed) if site.options.sheets else given
+    return surface, surface is not given
 
 
 def _with_decisions(site: Site, surface: Surface) -> Surface:
@@ -238,5 +240,4 @@ def _with_decisions(site: Site, surface: Surface) -> Surface:
 def _link_neighbors(site: Site, surface: Surface, normals: Floats, oriented: bool) -> Told:
     sample = surface.sample
     near = sheet_neighbors(sample.nearest, normals, oriented)
-    row, column = np.nonzero(near & site.inner(sample.scaled)[:, None])
-    return label_links(site, sample.scaled, row, sample.nearest.index[row, column])
+    return label_links(site, sample.scaled, sample.nearest.index, near)
