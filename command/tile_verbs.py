@@ -98,6 +98,7 @@ class TilesRun(_Cutting):
 
     def add_options(self, parser):
         super().add_options(parser)
+        _add_modes(parser, 0)
         parser.add_argument("--workers", type=int, default=1, metavar="INT", help="processes on this machine")
         parser.add_argument("--scheduler", default="", metavar="ADDRESS", help="of a Dask cluster that does the work")
         _add_format(parser)
@@ -106,9 +107,12 @@ class TilesRun(_Cutting):
         super().check(parser, arguments)
         if arguments.workers < 1:
             parser.error("--workers must be at least 1")
+        _check_modes(parser, arguments, 0)
 
     def run(self, path, arguments, output):
         store, notices = self.cut(arguments, arguments.workers)
+        if arguments.modes:
+            core.tiles.ask_for_modes(store, arguments.modes, arguments.mode_points)
         with (
             ToldStages(self.name) as stages,
             tile_work.workers(arguments.workers, store.manifest["memory"], arguments.scheduler) as spread,
@@ -155,7 +159,7 @@ class TilesSurvey(_Stage):
     def run(self, path, arguments, output):
         store = self.store(path)
         waiting = core.tiles.pending(store)
-        if waiting is None or waiting[0].name == "measure":
+        if store.agreed_after("measure") or waiting[0].name == "measure":
             return {"step": None, "visited": 0, "waiting": 0, "notices": ["The survey is done: measure the tiles."]}
         return {**_visit(store, waiting, arguments.tiles), "notices": []}
 
@@ -191,7 +195,9 @@ class TilesMeasure(_Stage):
     def run(self, path, arguments, output):
         store = self.store(path)
         waiting, found = core.tiles.pending(store), {"step": None, "visited": 0, "waiting": 0}
-        if waiting is not None and waiting[0].name != "measure":
+        if store.agreed_after("measure"):
+            waiting = None
+        elif waiting[0].name != "measure":
             raise core.PointCloudError(f"{path} waits for the step {waiting[0].name} of the survey. Take it first.")
         if waiting is not None:
             found = _visit(store, waiting, arguments.tiles)
@@ -200,6 +206,32 @@ class TilesMeasure(_Stage):
         mine = [tile for tile in measured if tile % count == number - 1]
         _write(store, path, mine, arguments.tile_format, lambda function, many: (function(*given) for given in many))
         return {**found, "notices": []}
+
+
+class TilesModes(_Stage):
+    """The verb `tiles modes`."""
+
+    name = "tiles modes"
+    help = "take the next step towards the low vibration modes at the tiles, all or a share; tiles agree follows each"
+
+    def add_options(self, parser):
+        _add_modes(parser, 10)
+        _add_share(parser)
+
+    def check(self, parser, arguments):
+        super().check(parser, arguments)
+        _check_modes(parser, arguments, 1)
+
+    def run(self, path, arguments, output):
+        store = self.store(path)
+        waiting = core.tiles.pending(store)
+        if not store.agreed_after("measure"):
+            raise core.PointCloudError(f"{path} waits for the step {waiting[0].name}. Measure the tiles first.")
+        core.tiles.ask_for_modes(store, arguments.modes, arguments.mode_points)
+        waiting = core.tiles.pending(store)
+        if waiting is None:
+            return {"step": None, "visited": 0, "waiting": 0, "notices": ["The modes are done."]}
+        return {**_visit(store, waiting, arguments.tiles), "notices": []}
 
 
 class TilesReport(_Stage):
@@ -248,12 +280,31 @@ def _report(store, folder, form):
     lines = [{"path": record["file"], **shared, **record} for record in records]
     write_text(folder / _REPORT, "".join(f"{json.dumps(line)}\n" for line in lines))
     errors = [{"tile": record["tile"], "error": record["error"]} for record in records if "error" in record]
-    return {**tile_work.totals(store, records), "errors": errors}
+    modes = {"eigenvalues": tile_work.eigenvalues(store)} if store.agreed_after("spectrum") else {}
+    return {**tile_work.totals(store, records), **modes, "errors": errors}
 
 
 def _suffix(form):
     """Return the ending of results in files; none where they stay in the store as .npz."""
     return "" if form == "npy" else f".{form}"
+
+
+def _add_modes(parser, default):
+    parser.add_argument(
+        "--modes",
+        type=int,
+        default=default,
+        metavar="INT",
+        help="how many vibration modes to compute, by evenly spread points; all points get them",
+    )
+    parser.add_argument(
+        "--mode-points", type=int, metavar="INT", help="how many such points; else a million, or as the memory allows"
+    )
+
+
+def _check_modes(parser, arguments, least):
+    if arguments.modes < least or (arguments.mode_points is not None and arguments.mode_points < 1):
+        parser.error("--modes and --mode-points are numbers above zero")
 
 
 def _add_share(parser):

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from . import clouds, core
-from .quantities import rows_of
+from .quantities import eigenvector_name, rows_of
 
 STORE = "store"  # the folder within that of a run
 _PIECE = 1_000_000  # points that are read at once
@@ -62,10 +62,10 @@ def visit(store, step, number):
 
 def write_tile(store, number, path):
     """Write the results of a tile, with the columns of its points, unless that is done; return its number."""
-    path = Path(path)
-    if path.exists():
+    path, store = Path(path), core.tiles.Store(store)
+    if path.exists() and path.stat().st_mtime_ns >= store.changed(number, ("measure", "modes")):
         return number
-    table = _table(core.tiles.Store(store), number)
+    table = _table(store, number)
     if path.suffix.lower() not in core.files.LASER_FILES:
         core.files.write_points(path, table)
         return number
@@ -85,6 +85,9 @@ def _table(store, number):
         full = store.manifest["full color"] or 1.0
         colors[:, : len(channels)] = np.clip(np.stack(channels, axis=1) / full, 0.0, 1.0)
     measures = {row.attribute: row.of(results) for row in rows_of("analyze")}
+    if store.done("modes", number):
+        vectors = store.read("modes", number, "modes").T
+        measures |= {eigenvector_name(place): vector for place, vector in enumerate(vectors, 1)}
     return clouds.with_results(core.files.PointTable(store.own(number), columns, colors), measures)
 
 
@@ -161,6 +164,11 @@ def tile_records(store, folder, suffix):
         else:
             records.append({**record, "waiting": True})
     return records
+
+
+def eigenvalues(store):
+    """Return the eigenvalues of the modes that all tiles have."""
+    return next(store.told("spectrum", "values")).tolist()
 
 
 def totals(store, records):

@@ -29,7 +29,7 @@ from .settings import LAPLACIAN, Setting, chosen
 from .source_verbs import ExtendDirection, GeodesicDistance, NearestSource, SignedDistance, Simulate, Unwrap
 from .summary import Report
 from .table_verbs import Profile, Section
-from .tile_verbs import TilesAgree, TilesCut, TilesMeasure, TilesReport, TilesRun, TilesSurvey
+from .tile_verbs import TilesAgree, TilesCut, TilesMeasure, TilesModes, TilesReport, TilesRun, TilesSurvey
 
 
 def make_verbs() -> list:
@@ -42,7 +42,7 @@ def make_verbs() -> list:
 
 def without_object() -> list:
     """Return new verbs that in Blender, too, need no object."""
-    on_tiles = TilesRun(), TilesCut(), TilesSurvey(), TilesAgree(), TilesMeasure(), TilesReport()
+    on_tiles = TilesRun(), TilesCut(), TilesSurvey(), TilesAgree(), TilesMeasure(), TilesModes(), TilesReport()
     return [Info(), Convert(), SplatInfo(), Deform(), Report(), *on_tiles]
 
 

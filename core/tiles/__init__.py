@@ -3,6 +3,7 @@
 from .cut import HALO, Tile, cut
 from .cutting import cut_to_store, points_of_tile
 from .measure import Measured, measure_tile
+from .modes import ask_for_modes
 from .run import pending, run_steps, settle, steps_of, visit_tile
 from .store import Store
 from .survey import survey

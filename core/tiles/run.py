@@ -7,13 +7,15 @@ from collections.abc import Callable, Iterable, Sequence
 
 from ..types import Progress
 from .cutting import HALOS
+from .modes import MODES
 from .steps import MEASURE, Step, agree, survey_steps, visit
 from .store import Store
 
 
 def steps_of(store: Store) -> list[Step]:
     """Return all steps of a store, in their order."""
-    return [*HALOS, *survey_steps(store.options), MEASURE]
+    modes = MODES if "modes" in store.record else ()
+    return [*HALOS, *survey_steps(store.options), MEASURE, *modes]
 
 
 def pending(store: Store) -> tuple[Step, list[int]] | None:

@@ -20,7 +20,8 @@ def _all(shelf: Shelf) -> Sequence[int]:
     return shelf.alive
 
 
-def _first(shelf: Shelf) -> Sequence[int]:
+def at_first(shelf: Shelf) -> Sequence[int]:
+    """Return the one tile at which a step is that is of all."""
     return shelf.alive[:1]
 
 
@@ -72,7 +73,7 @@ _SURVEY = (
     Step("pieces", neighborhoods.link_pieces, neighborhoods.agree_on_pieces, of_sheets=True),
     Step("bridges", neighborhoods.find_bridges, neighborhoods.agree_on_bridges, of_sheets=True),
     Step("areas", measures.find_areas, measures.agree_on_areas),
-    Step("shares", measures.share_weights, measures.agree_on_shares, _first),
+    Step("shares", measures.share_weights, measures.agree_on_shares, at_first),
 )
 MEASURE = Step("measure", measures.measure)
 

@@ -145,6 +145,11 @@ class Store:
         """Whether a step has been at a tile."""
         return self._path(step, number).exists()
 
+    def changed(self, number: int, steps: Sequence[str]) -> int:
+        """Return when the last of some steps has told of a tile, in nanoseconds."""
+        paths = [self._path(step, number) for step in steps]
+        return max((path.stat().st_mtime_ns for path in paths if path.exists()), default=0)
+
     def state(self, step: str, number: int) -> Any:
         """Return what the last step at a tile before this one has left to go on from; None at first.
 

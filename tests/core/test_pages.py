@@ -49,7 +49,7 @@ def test_program(snippet, tmp_path, monkeypatch):
         write_points(Path(name), PointTable(points))
     if " report " in snippet.text:
         run(["info", "scan.ply", "--report", "thin/reports/1.jsonl"], verbs.make_verbs(), "meshfree")
-    if re.search(r" tiles (survey|agree|measure|report) | report out$", snippet.text):
+    if re.search(r" tiles (survey|agree|measure|modes|report) | report out$", snippet.text):
         run(["tiles", "run", "scans", "--out-dir", "out", "--tile-points", "900"], verbs.make_verbs(), "meshfree")
     assert run(shlex.split(snippet.text)[1:], verbs.make_verbs(), "meshfree") == 0
 

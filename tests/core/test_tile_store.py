@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import core
+from benchmarks.samplings import fibonacci_sphere
 from core.tiles.medians import median
 
 HALO, DEGREE = 45.0, 12  # as in the tests of tiles in memory
@@ -207,6 +208,29 @@ class TestCut:
         assert 0.99 < core.memory.needed_memory(int(with_halo), options) / (2 << 30) <= 1.0
         with pytest.raises(core.NotEnoughMemoryError, match="at least"):
             core.tiles.points_of_tile(1 << 27, options)
+
+
+def test_modes_are_carried_from_evenly_spread_points_to_all(tmp_path):
+    points = fibonacci_sphere(2400)
+    store = core.tiles.cut_to_store(lambda: [(points, {})], tmp_path / "store", 1200)
+    core.tiles.run_steps(store)
+    core.tiles.ask_for_modes(store, 4, 700)
+    core.tiles.run_steps(store)
+    values = next(store.told("spectrum", "values"))
+    np.testing.assert_allclose(values, [0.0, 2.0, 2.0, 2.0], atol=0.02)
+    source, normals, vectors = (next(store.told("spectrum", name)) for name in ("points", "normals", "vectors"))
+    assert len(source) <= 700
+    every = core.Prolongation(np.concatenate([source, points]), np.arange(len(source)), normals)
+    found = np.concatenate([store.read("modes", number, "modes") for number in range(2)])
+    own = np.concatenate([store.own(number) for number in range(2)])
+    order = np.lexsort(points.T)
+    wanted = every.interpolate(vectors)[len(source) :][order]
+    np.testing.assert_allclose(found[np.lexsort(own.T)], wanted, atol=1e-5 * np.abs(wanted).max())
+    areas = np.concatenate([store.read("measure", number, "areas") for number in range(2)])
+    np.testing.assert_allclose(found.T @ (areas[:, None] * found), np.eye(4), atol=0.02)
+    core.tiles.ask_for_modes(store, 4, 700)
+    with pytest.raises(core.InvalidPointsError, match="has 4 modes"):
+        core.tiles.ask_for_modes(store, 5, 700)
 
 
 def test_no_store(tmp_path):

@@ -118,7 +118,13 @@ def test_stages_give_the_same_to_the_bit(run, scans, done, tmp_path):
     for number in range(2):
         for name in ("areas", "normals", "mean_curvature"):
             np.testing.assert_array_equal(second.read("measure", number, name), first.read("measure", number, name))
+    for _ in range(3):
+        assert run("tiles", "modes", out, "--modes", 3, "--mode-points", 600)[0] == 0
+        assert run("tiles", "agree", out)[0] == 0
+    run("tiles", "measure", out)
+    assert "lb_eigenvector_003" in read_points(out / "tile_000001.ply").attributes
     code, [line] = run("tiles", "report", out, "--out", tmp_path / "table.csv")
+    assert len(line["eigenvalues"]) == 3
     assert (code, line["measured_points"], line["errors"]) == (0, COUNT, [])
     assert len((tmp_path / "table.csv").read_text().splitlines()) == 3
 

@@ -1,0 +1,97 @@
+"""The low vibration modes of a cloud in tiles: of evenly spread points of it, carried to all of them tile by tile."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..errors import InvalidPointsError
+from ..geometry import Prolongation, blue_noise_subset
+from ..memory import needed_memory
+from ..operator import build_laplacian
+from .shelf import Told
+from .site import Site
+from .steps import Step, at_first
+from .store import Store
+
+_CANDIDATES = 3  # for each point wanted, from all tiles
+_MOST = 1_000_000  # points by which modes are computed, where the memory allows: more are slow to factorize
+_NEIGHBORS = 9  # as of Prolongation
+_WANTED = "modes wanted"  # the name under which a store keeps that
+
+
+def ask_for_modes(store: Store, modes: int, most: int | None = None) -> None:
+    """Let a store have the low modes of its cloud, by further steps.
+
+    Parameters
+    ----------
+    store : Store
+    modes : int
+        How many.
+    most : int, optional
+        Points by which they are computed; else a million, or fewer if the memory of a worker is not enough.
+
+    Raises
+    ------
+    InvalidPointsError
+        No modes, or others than before.
+    """
+    if most is None:
+        memory = store.manifest["memory"]
+        most = _MOST if memory is None else min(_MOST, memory // needed_memory(1, store.options, modes))
+    if min(modes, most) < 1:
+        raise InvalidPointsError(f"{modes} modes by {most} points were asked for. Ask for at least one.")
+    if not store.agreed_after(_WANTED):
+        store.settle(_WANTED, {"modes": np.array(modes), "mode points": np.array(most)})
+    elif (int(store.record["modes"]), int(store.record["mode points"])) != (modes, most):
+        raise InvalidPointsError(
+            f"{store.folder} has {int(store.record['modes'])} modes by {int(store.record['mode points'])} points. Ask"
+            " for these, or choose another folder."
+        )
+
+
+def find_candidates(site: Site, state: Any) -> tuple[None, Told]:
+    """Choose evenly spread points of a tile, more than are needed."""
+    component, points = site.told("measure", "component"), site.shelf.own(site.number)
+    on = points[component >= 0]
+    total = sum(len(site.shelf.own(number)) for number in site.shelf.alive)
+    wanted = -(-_CANDIDATES * int(site.record["mode points"]) * len(on) // total)
+    chosen = blue_noise_subset(on, wanted) if len(on) else np.arange(0)
+    return None, {"points": on[chosen]}
+
+
+def find_modes(site: Site, state: Any) -> tuple[None, Told]:
+    """Compute the modes on evenly spread points of all tiles."""
+    points = np.concatenate(list(site.shelf.told("candidates", "points")))
+    points = points[blue_noise_subset(points, int(site.record["mode points"]))]
+    laplacian = build_laplacian(points, options=site.options)
+    spectrum = laplacian.eigenpairs(int(site.record["modes"]))
+    return None, {
+        "points": points,
+        "normals": laplacian.normals,
+        "component": laplacian.component,
+        "vectors": spectrum.eigenvectors,
+        "values": spectrum.eigenvalues,
+    }
+
+
+def carry_modes(site: Site, state: Any) -> tuple[None, Told]:
+    """Carry the modes to the points in the box of a tile."""
+    source = site.shelf.alive[0]
+    names = ("points", "normals", "component", "vectors")
+    points, normals, component, vectors = (site.shelf.read("spectrum", source, name) for name in names)
+    own = site.shelf.own(site.number)
+    near = np.unique(cKDTree(points).query(own, k=min(_NEIGHBORS, len(points)))[1])
+    every = Prolongation(np.concatenate([points[near], own]), np.arange(len(near)), normals[near], component[near])
+    modes = every.interpolate(vectors[near])[len(near) :]
+    modes[site.told("measure", "component") < 0] = 0.0
+    return None, {"modes": modes}
+
+
+MODES = (
+    Step("candidates", find_candidates),
+    Step("spectrum", find_modes, where=at_first),
+    Step("modes", carry_modes),
+)
