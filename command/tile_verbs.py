@@ -3,6 +3,7 @@
 import argparse
 import json
 import time
+from dataclasses import fields
 from pathlib import Path
 
 from . import core, tile_work
@@ -14,7 +15,7 @@ from .stages import ToldStages
 from .tile_work import STORE
 from .verb import ONE_LINE, Verb
 
-_SETTINGS = [LAPLACIAN[name] for name in core.LaplacianOptions.__dataclass_fields__]
+_SETTINGS = [LAPLACIAN[field.name] for field in fields(core.LaplacianOptions)]
 _FORMATS = (".ply", ".laz", ".las", ".csv", ".xyz", ".npy")
 _REPORT = f"tiles{SUFFIX}"  # in the folder of a run
 
@@ -70,7 +71,7 @@ class _Cutting(_TileVerb):
         options = core.LaplacianOptions(
             **{name: value.lower() if isinstance(value, str) else value for name, value in given.items()}
         )
-        folder, memory = arguments.folder / STORE, arguments.memory or tile_work.free_memory() // count
+        folder, memory = arguments.folder / STORE, arguments.memory or core.tiles.memory_of_worker(count)
         known = {"sources": [str(path.resolve()) for path in arguments.sources]}
         if folder.exists():
             store = core.tiles.Store(folder)

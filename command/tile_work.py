@@ -125,7 +125,7 @@ def workers(count, memory, address):
                 threads_per_worker=1,
                 memory_limit=memory,
                 dashboard_address=None,
-                env={"MESHFREE_CORES": str(max(1, core.cores.cores() // count))},
+                env={"MESHFREE_CORES": str(core.tiles.cores_of_worker(count))},
             )
             address = stack.enter_context(cluster)
         client = stack.enter_context(Client(address))
@@ -204,8 +204,3 @@ def bytes_of(text):
     if not value > 0.0:
         raise ValueError(f"{text!r} is no size, such as 2GB")
     return int(value)
-
-
-def free_memory():
-    """Return the bytes that may be taken where nothing is said."""
-    return core.memory.available_memory() or 4 << 30

@@ -7,3 +7,4 @@ from .modes import ask_for_modes
 from .run import pending, run_steps, settle, steps_of, visit_tile
 from .store import Store
 from .survey import survey
+from .workers import cores_of_worker, memory_of_worker
