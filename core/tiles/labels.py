@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -76,10 +77,8 @@ class Merged(NamedTuple):
 def merge_labels(shelf: Shelf, step: str) -> Merged:
     """Merge the labels that `label_links` gave in a step, over the points that links reach in other tiles."""
     alive = [number for number in shelf.alive if shelf.done(step, number)]
-    counts = np.zeros(max(alive) + 2, dtype=np.int64)
-    sizes = [shelf.read(step, number, "size") for number in alive]
-    counts[np.array(alive) + 1] = [len(size) for size in sizes]
-    start = np.cumsum(counts)
+    sizes = list(shelf.told(step, "size"))
+    start = starts(shelf, step, map(len, sizes))
     edges: list[Ints] = [np.zeros((2, 0), dtype=np.int64)]
     for number in alive:
         owner, place, reached = (shelf.read(step, number, name) for name in ("owner", "place", "reached"))
@@ -93,6 +92,21 @@ def merge_labels(shelf: Shelf, step: str) -> Merged:
     graph = sparse.csr_array((np.ones(len(first), dtype=bool), (first, second)), shape=(start[-1], start[-1]))
     label = connected_components(graph, directed=False)[1]
     return Merged(start, label, np.bincount(label, np.concatenate(sizes)).astype(np.int64))
+
+
+def starts(shelf: Shelf, step: str, counts: Iterable[int]) -> Ints:
+    """Return where the labels of each tile begin among those of all, by how many a step has told of each that it has.
+
+    Returns
+    -------
+    ndarray, (tiles + 1,) int
+        Up to the last tile that the step has been at.
+    """
+    done = np.array([number for number in shelf.alive if shelf.done(step, number)])
+    length = np.zeros(done.max() + 2, dtype=np.int64)
+    length[done + 1] = list(counts)
+    begin: Ints = np.cumsum(length)
+    return begin
 
 
 def names_of(step: str, name: str, start: Ints, values: Array) -> Record:

@@ -22,7 +22,7 @@ from ..geometry import (
 from ..operator import LaplaceBeltrami, assemble_laplacian, build_laplacian, mean_curvature, solve_areas
 from ..options import LaplacianOptions
 from ..types import Array, Floats, Ints
-from .labels import agree_on_signs
+from .labels import agree_on_signs, starts
 from .neighborhoods import Fitted, divided
 from .shelf import Part, Record, Shelf, Told
 from .site import Site
@@ -73,14 +73,14 @@ def compare_sides(site: Site, fitted: Fitted) -> tuple[None, Told]:
 def agree_on_flips(shelf: Shelf, options: LaplacianOptions) -> Record:
     """Agree on which patches are reversed, so that all agree."""
     alive = [number for number in shelf.alive if shelf.done("sides", number)]
-    counts = np.zeros(max(alive) + 2, dtype=np.int64)
-    counts[np.array(alive) + 1] = [int(count) for count in shelf.told("patches", "count")]
-    start = np.cumsum(counts)
+    start = starts(shelf, "patches", map(int, shelf.told("patches", "count")))
     votes: list[Array] = []
     for number in alive:
         links, alike = shelf.read("patches", number, "links"), shelf.read("patches", number, "votes")
         votes.append(np.column_stack([links + start[number], _LINK * alike]))
         pairs, alike = shelf.read("sides", number, "pairs"), shelf.read("sides", number, "votes")
+        known = np.isin(pairs[:, 1], alive)  # not one that has failed since
+        pairs, alike = pairs[known], alike[known]
         votes.append(np.column_stack([pairs[:, 0] + start[number], start[pairs[:, 1]] + pairs[:, 2], alike]))
     first, second, weight = np.concatenate(votes).T
     sign = agree_on_signs(first.astype(int), second.astype(int), weight, int(start[-1]))

@@ -34,7 +34,7 @@ from ..geometry import (
 from ..memory import check_memory
 from ..options import LaplacianOptions
 from ..types import Floats, Ints
-from .labels import label_links, merge_labels, names_of
+from .labels import label_links, merge_labels, names_of, starts
 from .medians import median
 from .shelf import Record, Shelf, Told
 from .site import Site
@@ -178,14 +178,11 @@ def join_sheets(site: Site, fitted: Fitted) -> tuple[None, Told]:
 
 def agree_on_sheets(shelf: Shelf, options: LaplacianOptions) -> Record:
     """Agree on the numbers of sheets within components."""
-    alive = [number for number in shelf.alive if shelf.done("touching", number)]
     kinds = list(shelf.told("touching", "kind"))
-    counts = np.zeros(max(alive) + 2, dtype=np.int64)
-    counts[np.array(alive) + 1] = [len(kind) for kind in kinds]
     _, label = np.unique(np.concatenate(kinds), axis=0, return_inverse=True)
     label = label.reshape(-1)
     size = np.bincount(label, np.concatenate(list(shelf.told("touching", "size")))).astype(np.int64)
-    return names_of("touching", "sheet", np.cumsum(counts), number_sizes(size, 0)[label])
+    return names_of("touching", "sheet", starts(shelf, "touching", map(len, kinds)), number_sizes(size, 0)[label])
 
 
 def link_pieces(site: Site, fitted: Fitted) -> tuple[None, Told]:
