@@ -2,7 +2,7 @@
 
 Differences are the largest in the whole cloud, relative to the largest value, of areas and lengths to their own.
 
-``python -m benchmarks.tiles store [points [tile_points [folder]]]`` walks over tiles on disk in this process, and
+``python -m benchmarks.tiles store [points [tile_points [halo [degree [folder]]]]]`` walks over tiles on disk in this process, and
 prints CPU seconds a point beside those of a cloud of 200,000, the most memory, and the bytes on disk; a folder that
 exists is gone on with.
 """
@@ -77,7 +77,7 @@ def main(count=400_000, tiles=8, halo=core.tiles.HALO):
     compare("noisy", points + noise, int(tiles), float(halo))
 
 
-def store(count=1_000_000, most=250_000, folder=""):
+def store(count=1_000_000, most=250_000, halo=core.tiles.HALO, degree=core.tiles.DEGREE, folder=""):
     """Measure what tiles on disk cost."""
     count, most = int(count), int(most)
     with tempfile.TemporaryDirectory() as temporary:
@@ -86,7 +86,9 @@ def store(count=1_000_000, most=250_000, folder=""):
         if not place.exists():
             parts = np.array_split(torus_points(count), -(-count // 1_000_000))
             began = time.process_time()
-            core.tiles.cut_to_store(lambda: ((part, {}) for part in parts), place, most)
+            core.tiles.cut_to_store(
+                lambda: ((part, {}) for part in parts), place, most, halo=float(halo), degree=int(degree)
+            )
             del parts
         cut = time.process_time() - began
         tiles = core.tiles.Store(place)

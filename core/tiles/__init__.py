@@ -6,5 +6,5 @@ from .measure import Measured, measure_tile
 from .modes import ask_for_modes
 from .run import pending, run_steps, settle, steps_of, visit_tile
 from .store import Store
-from .survey import survey
+from .survey import DEGREE, survey
 from .workers import cores_of_worker, memory_of_worker

@@ -56,7 +56,9 @@ def find_candidates(site: Site, state: Any) -> tuple[None, Told]:
     """Choose evenly spread points of a tile, more than are needed."""
     component, points = site.told("measure", "component"), site.shelf.own(site.number)
     on = points[component >= 0]
-    total = sum(len(site.shelf.own(number)) for number in site.shelf.alive)
+    assert isinstance(site.shelf, Store)
+    sizes = site.shelf.manifest["tiles"]
+    total = sum(sizes[number]["points"] for number in site.shelf.alive)
     wanted = -(-_CANDIDATES * int(site.record["mode points"]) * len(on) // total)
     chosen = blue_noise_subset(on, wanted) if len(on) else np.arange(0)
     return None, {"points": on[chosen]}
