@@ -2,9 +2,9 @@
 
 Differences are the largest in the whole cloud, relative to the largest value, of areas and lengths to their own.
 
-``python -m benchmarks.tiles store [points [tile_points [halo [degree [folder]]]]]`` walks over tiles on disk in this process, and
-prints CPU seconds a point beside those of a cloud of 200,000, the most memory, and the bytes on disk; a folder that
-exists is gone on with.
+``python -m benchmarks.tiles store [points [tile_points [halo [degree [folder]]]]]`` walks over tiles on disk in this
+process, and prints CPU seconds a point beside those of a cloud of 200,000, the most memory, and the bytes on disk; a
+folder that exists is gone on with.
 """
 
 import resource

@@ -37,6 +37,7 @@ NOT_RUN = {
     "python -m benchmarks.holes": SLOW,
     "python -m benchmarks.orientation": SLOW,
     "python -m benchmarks.tiles 40000 4 60": SLOW,
+    "python -m benchmarks.tiles store 500000 250000": SLOW,
     "MESHFREE_ZOO=folder python -m benchmarks.ablation": SLOW,
     "MESHFREE_ZOO=folder python -m benchmarks.alignment": SLOW,
     "MESHFREE_ZOO=folder python -m benchmarks.real_shapes": SLOW,
