@@ -62,8 +62,11 @@ def main():
         "profile": [option("from", top), option("to", low)],
         "minimal-surface": ["--steps", "2"],
         "deform": ["--handles", "handles.json"],
+        "tiles run": ["--out-dir", "tiles"],
+        "tiles cut": ["--out-dir", "cut"],
     }
     inputs = {"splat-info": "splats.ply", "report": "reports"}
+    inputs |= {f"tiles {stage}": "tiles" for stage in ("survey", "agree", "measure", "modes", "report")}
     for verb in make_verbs():
         output = f"{verb.name}{verb.outputs[0]}" if verb.outputs else ""
         more = ["--out", output] if output else []
