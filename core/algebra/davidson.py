@@ -49,7 +49,7 @@ def coarse_to_fine(
     tolerance : float
         Largest residual, over the last eigenvalue wanted.
     scale : float
-        What that eigenvalue counts as at least.
+        What that eigenvalue counts as at least, and about is.
     report : callable
         Called with the fraction done; may raise `Cancelled`.
 
@@ -60,7 +60,7 @@ def coarse_to_fine(
     """
     with ThreadPoolExecutor(cores()) as pool:
         least = max(SMALL, 5 * count)
-        levels, last, mass = build_levels(matrix, slowest, least, 3 * count, pool, report)
+        levels, last, mass = build_levels(matrix, slowest, least, 3 * count, pool, report, scale)
         if not levels or last.shape[0] > max(least, _DENSE):
             return None
         values, vectors = eigh(last.toarray(), mass.toarray())

@@ -123,7 +123,13 @@ class Level:
 
 
 def build_levels(
-    matrix: sparse.csr_array, slowest: Floats, least: int, enough: int, pool: ThreadPoolExecutor, report: Report
+    matrix: sparse.csr_array,
+    slowest: Floats,
+    least: int,
+    enough: int,
+    pool: ThreadPoolExecutor,
+    report: Report,
+    low: float = 0.0,
 ) -> tuple[list[Level], sparse.csr_array, sparse.csr_array]:
     """Build ever smaller versions of a matrix by smoothed aggregation (Vanek, Mandel and Brezina 1996).
 
@@ -139,6 +145,9 @@ def build_levels(
         Size that no version should fall below.
     pool, report
         As of `Rows`.
+    low : float
+        Eigenvalue up to which all eigenvectors are to be found in the last version. An unknown that has no more by
+        itself, as a part that hangs together with the rest by a thread, is one of them, and not joined with others.
 
     Returns
     -------
@@ -151,9 +160,9 @@ def build_levels(
     mass = None
     while matrix.shape[0] > least:
         n, diagonal, rows = matrix.shape[0], matrix.diagonal(), Rows(matrix, pool, report)
-        highest = diagonal.max()
-        # One that stands for a whole component couples with nothing, and is left to the last version.
-        diagonal[diagonal <= _ROUNDING * highest] = np.inf
+        highest, own = diagonal.max(), 1.0 if mass is None else mass.diagonal()
+        # Of one that stands for a whole component there is but rounding. Neither couples with others.
+        diagonal[diagonal <= np.maximum(_ROUNDING * highest, low * own)] = np.inf
         for share in STRONG:
             part = aggregates(rows, diagonal, share, report)[0]
             if part.max() >= enough:

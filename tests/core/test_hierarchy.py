@@ -127,14 +127,19 @@ def test_the_inverse_is_symmetric_and_positive(twins):
     assert y @ other > 0.0
 
 
-def test_components_that_become_one_unknown_each():
-    """Their diagonal is rounding then, by which nothing may be divided."""
+@pytest.mark.parametrize("thread", [0.0, 1e-6])
+def test_parts_that_become_one_unknown_each(thread):
+    """Their diagonal is rounding, by which nothing may be divided, or of a thread that they hang by: a low mode."""
     big = kernel_matrix(random_sphere(12_000), 10.0 / np.sqrt(12_000))  # a thousand on the second level
     small = [kernel_matrix(random_sphere(24, seed), 3.0) for seed in range(12)]
     matrix = sparse.block_diag([big, *small], format="csr")
+    for start in range(12_000, matrix.shape[0], 24):
+        ends = [0, start, 0, start], [0, start, start, 0]
+        matrix += sparse.csr_array((thread * np.array([1.0, 1.0, -1.0, -1.0]), ends), shape=matrix.shape)
     count = len(small) + 4
-    values, vectors = coarse_to_fine(matrix, np.ones(matrix.shape[0]), count, 1e-6, 0.0, lambda fraction=0.0: None)
-    assert np.abs(values[: 1 + len(small)]).max() < 1e-9 * values[-1]
+    values, vectors = coarse_to_fine(matrix, np.ones(matrix.shape[0]), count, 1e-6, 1e-3, lambda fraction=0.0: None)
+    assert np.abs(values[: 1 + len(small)]).max() < thread + 1e-9 * values[-1]
+    assert np.abs(values[1 : 1 + len(small)] - thread / 24.0).max() < 1e-2 * thread + 1e-9 * values[-1]
     missed = np.linalg.norm(matrix @ vectors - vectors * values, axis=0)
     assert missed.max() < 1e-6 * values[-1]
     assert values[-3] > 0.5 * values[-1]  # the three of degree one
