@@ -474,6 +474,7 @@ def calls():
     yield core.stray_points, {}, {"points": points, "strictness": 1.0, "smallest": 30, "smallest_area": 0.0}
     yield core.thin_out, {}, {"points": points, "spacing": 0.2}
     yield core.thin_out, {}, {"points": points, "count": 100, "keep_edges": False}
+    yield core.thin_pieces, {}, {"pieces": [(points, {})], "count": 100}
     yield core.clean_points, on, {"keep_edges": True, "dirichlet": False}
     yield core.measure_region, on, {"members": top}
     yield core.geodesic_path, on, {"start": 0, "end": 150}

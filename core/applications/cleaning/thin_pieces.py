@@ -1,12 +1,12 @@
 """Fewer points of a cloud that comes in pieces and may be larger than the memory: blue noise again, in one pass."""
 
 from bisect import bisect_left
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TypeAlias
 
 import numpy as np
 
-from ...arguments import whole
+from ...arguments import as_doubles, check_array, check_finite, whole
 from ...errors import InvalidPointsError
 from ...geometry import FINEST, blue_noise_subset, mix_bits
 from ...types import Array, Floats, Ints, Report
@@ -15,6 +15,7 @@ Piece: TypeAlias = tuple[Floats, dict[str, Array]]
 
 _CANDIDATES = 8  # for each point wanted at most: cells twice as wide are an eighth as many at least, hence enough
 _WAITING = 4  # further ones that come before the cells are looked at again, so that each is sorted a few times only
+_ADVICE = "Give pairs of coordinates, x, y, z for each point, and a dict of other numbers of each."
 _HALVES = 22  # of the extent, from which on there are 8 cells
 
 
@@ -44,7 +45,7 @@ def thin_pieces(pieces: Iterable[Piece], count: int, *, progress: Report | None 
     Raises
     ------
     InvalidPointsError
-        Coordinates that are not finite, or a count below 1.
+        Pieces of another form, coordinates that are not finite, or a count below 1.
 
     See Also
     --------
@@ -65,10 +66,7 @@ def thin_pieces(pieces: Iterable[Piece], count: int, *, progress: Report | None 
         raise InvalidPointsError(f"A choice of {count!r} points was asked for. Ask for a whole number of at least 1.")
     kept: list[Piece] = []
     grid = _Grid(_CANDIDATES * count, report)
-    for points, numbers in pieces:
-        points = np.asarray(points, dtype=np.float64)
-        if not np.isfinite(points).all():
-            raise InvalidPointsError("A piece has coordinates that are not finite. Leave out these points.")
+    for points, numbers in _checked(pieces):
         report()
         if not len(points):
             continue
@@ -81,6 +79,26 @@ def thin_pieces(pieces: Iterable[Piece], count: int, *, progress: Report | None 
     if _size(kept) <= count:
         return kept
     return _taken(kept, blue_noise_subset(_all_points(kept), count, progress=report))
+
+
+def _checked(pieces: Iterable[Piece]) -> Iterator[Piece]:
+    """Yield the pieces with their points in double precision; refuse what is none."""
+    if not isinstance(pieces, Iterable) or isinstance(pieces, np.ndarray):
+        raise InvalidPointsError(f"Pieces are of type {type(pieces).__name__}. {_ADVICE}")
+    for piece in pieces:
+        if not (isinstance(piece, tuple) and len(piece) == 2 and isinstance(piece[1], dict)):
+            raise InvalidPointsError(f"A piece is of type {type(piece).__name__}. {_ADVICE}")
+        points = as_doubles(check_array(piece[0], "Points of a piece", [(None, 3)], _ADVICE), copy=False)
+        check_finite(points, "points of a piece", "Leave these out.")
+        yield (
+            points,
+            {
+                str(name): check_array(
+                    values, f"Numbers {name!r}", [(len(points),), (len(points), None)], _ADVICE, "biufc"
+                )
+                for name, values in piece[1].items()
+            },
+        )
 
 
 def _size(pieces: Sequence[Piece]) -> int:
