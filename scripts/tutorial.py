@@ -16,6 +16,7 @@ WORKING = "len(main_window().modal_operators)"
 MOVED = f"np.linalg.norm(attribute({CORAL}, 'lb_displacement'), axis=1).max()"
 # Buttons of the top bar, and of the menu *File*, from which others open to the right.
 _FILE, _NEW, _GENERAL, _IMPORT = (46, 14), (70, 38), (300, 37), (80, 311)
+_ENTRY = 22  # height of one
 _ORDERS = re.compile(  # words for what is to be done
     r"\b(press|click|choose|open|switch|drag a|set|delete|move the mouse|start|look at)\b", re.IGNORECASE
 )
@@ -72,7 +73,7 @@ def import_sample(gui, quote, keep):
     gui.key("Delete")
     gui.wait_until("'Cube' not in bpy.data.objects")
     quote("Choose *File > Import > Points*")
-    for place in (_FILE, _IMPORT, _last_entry(gui)):
+    for place in (_FILE, _IMPORT, _points_entry(gui)):
         gui.click(*(place(gui) if callable(place) else place))
     gui.wait_until(f"{_BROWSER} is not None")
     quote("click `coral.ply` in the file browser")
@@ -99,8 +100,8 @@ def import_sample(gui, quote, keep):
     keep("import")
 
 
-def _last_entry(gui):
-    """Return what finds the last entry of the menu that is open beside *Import*."""
+def _points_entry(gui):
+    """Return what finds the entry *Points*, the last but one of the menu that is open beside *Import*."""
 
     def find(gui):
         gui.settle()
@@ -108,7 +109,7 @@ def _last_entry(gui):
         column = gui.pixels((x + 40, y, 1, 400)).max(axis=2)[:, 0]
         dark = column < 45  # the menu, which the view is not; letters are above that
         below = next(row for row in range(len(dark)) if not dark[row : row + 30].any())
-        return x + 100, y + below - 14
+        return x + 100, y + below - 14 - _ENTRY
 
     return find
 
