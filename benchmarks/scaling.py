@@ -36,7 +36,7 @@ PICTURE = "pictures/results/scaling.png"
 COUNTS = 10_000, 100_000, 1_000_000
 MODES = 50
 TOLERANCE = 1e-4  # of their residuals: eigenvalues are right to nine digits then
-LARGEST = 100_000  # beyond, the peers are left out
+LARGEST = 100_000  # beyond, the peers and the applications are left out
 STAGES = {  # the rest of the build is its surface: outliers, components, quadrics, sheets, noise, cells
     "pairs": [(cloud, "find_pairs"), (cloud, "separate_sheets"), (laplacian, "arc_length")],
     "normals": [(cloud, "orient_by_winding")],
@@ -173,10 +173,11 @@ def growth(values, counts):
 def main(counts):
     """Measure, and write tables and the plot."""
     few = [count for count in counts if count <= LARGEST]
-    results = {run: [measure(run, count) for count in (counts if run in OWN else few)] for run in RUNS}
-    tables = [_stages(run.capitalize(), results[run], counts) for run in OWN]
+    measured = {run: counts if run == "operator" else few for run in RUNS}
+    results = {run: [measure(run, count) for count in measured[run]] for run in RUNS}
+    tables = [_stages(run.capitalize(), results[run], measured[run]) for run in OWN]
     tables += [_whole(results["operator"], counts), _against_peer(results, few), _geodesics(results, few)]
-    _plot(results, counts)
+    _plot(results, measured)
     tables[0].plots.append(PICTURE)
     text = "\n".join(table.markdown() for table in tables)
     DOCUMENT.write_text(f"# Time and memory\n\n{__doc__.splitlines()[0]}\n\n{text}", encoding="utf-8")
@@ -226,11 +227,13 @@ def _geodesics(results, counts):
     return Table("Geodesics", header, rows, note)
 
 
-def _plot(results, counts):
+def _plot(results, measured):
     figure, panels = pyplot.subplots(1, 2, figsize=(12, 4), dpi=80, layout="constrained")
     for axes, run in zip(panels, OWN, strict=True):
         for name in results[run][-1]["seconds"]:
-            axes.loglog(counts, [result["seconds"][name] for result in results[run]], "o-", label=name, markersize=4)
+            axes.loglog(
+                measured[run], [result["seconds"][name] for result in results[run]], "o-", label=name, markersize=4
+            )
         axes.set(title=run.capitalize(), xlabel="points", ylabel="seconds")
         axes.grid(which="both", alpha=0.2)
         axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8)  # beside the lines
