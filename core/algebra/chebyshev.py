@@ -28,6 +28,14 @@ def degree_needed(coefficients: Floats, tolerance: float) -> int:
     return int(np.argmax(left <= tolerance))
 
 
+def chebyshev_sum(product: Callable[[Floats], Floats], coefficients: Floats, start: Floats) -> Floats:
+    """Return the sum of the first `chebyshev_terms`, each times its coefficient, as an array of the same shape."""
+    result = np.zeros_like(start)
+    for coefficient, term in zip(coefficients, chebyshev_terms(product, start), strict=False):
+        result += coefficient * term
+    return result
+
+
 def chebyshev_terms(product: Callable[[Floats], Floats], start: Floats) -> Iterator[Floats]:
     """Yield ``T_0(M) y``, ``T_1(M) y`` and so on, without end, for the Chebyshev polynomials T_k.
 

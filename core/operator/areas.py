@@ -10,7 +10,7 @@ from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike
 from scipy.special import expit
 
-from ..algebra import chebyshev_terms, on_all_cores
+from ..algebra import chebyshev_sum, on_all_cores
 from ..geometry import ROUNDS, arc_length, read_cloud
 from ..kernel import kernel
 from ..options import LaplacianOptions
@@ -213,10 +213,7 @@ def _polynomial(matrix: KernelMatrix, root: Floats, residual: Floats, held: Bool
         image[held] = 0.0
         return image
 
-    terms, result = chebyshev_terms(product, residual), np.zeros_like(residual)
-    for coefficient, term in zip(coefficients, terms, strict=False):
-        result += coefficient * term
-    return result
+    return chebyshev_sum(product, coefficients, residual)
 
 
 @functools.cache

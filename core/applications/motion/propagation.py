@@ -15,6 +15,7 @@ from ...algebra import (
     Rows,
     chebyshev_coefficients,
     chebyshev_nodes,
+    chebyshev_sum,
     chebyshev_terms,
     dissect,
     factorize,
@@ -118,7 +119,7 @@ class Propagator:
                 inside[edge] = True
             steps, rows = 1, np.flatnonzero(inside)
             near = self._matrix[rows]
-            heat = _sum_of_terms(near[:, rows], weights, off[rows] / self._root[rows])
+            heat = chebyshev_sum(near[:, rows].__matmul__, weights, off[rows] / self._root[rows])
             beyond = 0.5 * self._top * self._root * (near.T @ heat)
             if time * np.abs(beyond[~inside]).max(initial=0.0) <= error:
                 return rows, self._root[rows] * heat - off[rows]
@@ -242,18 +243,6 @@ def read_pair(state: Any, count: int) -> tuple[Floats, bool]:
     except (TypeError, ValueError) as error:
         raise InvalidPointsError(f"The state is no pair: {error}. Give two functions of {count} numbers.") from error
     return np.stack([check_values(values, count, columns=False) for values in (first, second)]), columns
-
-
-def _sum_of_terms(matrix: sparse.csr_array, weights: Floats, start: Floats) -> Floats:
-    """Return the sum of Chebyshev polynomials of a small matrix, each times its weight, on a vector."""
-
-    def product(y: Floats) -> Floats:
-        return np.asarray(matrix @ y)
-
-    result = np.zeros_like(start)
-    for weight, term in zip(weights, chebyshev_terms(product, start), strict=False):
-        result += weight * term
-    return result
 
 
 def _silent(stage: str, fraction: float) -> None:
