@@ -1,6 +1,6 @@
 """LAS and LAZ, the files of laser scanners: by laspy and lazrs, which are imported only as such files are read."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
@@ -15,8 +15,8 @@ from .las_packing import PackedChunk, check_header, check_size
 from .rows import too_short
 from .table import CHANNELS, PointTable, color_by
 
-TIMES = "gps_time"
-_COLUMNS = ("intensity", "classification", "return_number", "nir", TIMES)  # that become attributes, if they exist
+_TIMES = "gps_time"
+_COLUMNS = ("intensity", "classification", "return_number", "nir", _TIMES)  # that become attributes, if they exist
 _COLORS = CHANNELS[:3]
 _WITHHELD = "withheld"
 _NUMBERS = (1, 3)  # of a column that becomes an attribute
@@ -141,13 +141,22 @@ def read_las(path: Path, las: LasChoices = LasChoices()) -> PointTable:
         if done < count:
             table.points = table.points[:done]
             table.attributes = {name: values[:done] for name, values in table.attributes.items()}
-        if not table.attributes.get(TIMES, np.ones(1)).any():  # some programs write zeros where they have none
-            del table.attributes[TIMES]
-        channels = {name: table.attributes.pop(name) for name in _COLORS if name in table.attributes}
-        if any(values.any() for values in channels.values()):  # scanners without a camera write black
-            color_by(table, channels, path)
+        settle_columns(table, path, _COLORS)
         table.degrees = file.is_geographic(table.points)
     return table
+
+
+def settle_columns(table: PointTable, path: Path, channels: Sequence[str] = CHANNELS) -> None:
+    """Drop times that are all zero from the attributes of a table, and color it by some of these, unless all are black.
+
+    Both stand for none: programs write zeros where they have no times, and scanners without a camera black.
+    """
+    if not table.attributes.get(_TIMES, np.ones(1)).any():
+        del table.attributes[_TIMES]
+    if table.attributes.keys() >= set(_COLORS):
+        found = {name: table.attributes.pop(name) for name in channels if name in table.attributes}
+        if any(found[name].any() for name in _COLORS):
+            color_by(table, found, path)
 
 
 def las_pieces(

@@ -12,10 +12,10 @@ from ..types import Array, Floats
 from .copc import Box
 from .e57 import e57_scans
 from .formats import SCANS, doubts, read_points, reading
-from .las import TIMES, Tally, las_pieces, opened_las
+from .las import Tally, las_pieces, opened_las, settle_columns
 from .las_choices import LasChoices
 from .ply import ply_pieces
-from .table import CHANNELS, FARTHEST, PointTable, check_places, color_by, full_color
+from .table import CHANNELS, FARTHEST, PointTable, check_places, full_color
 
 _NOWHERE = np.full((2, 3), np.nan)
 
@@ -243,12 +243,7 @@ def join_pieces(
             table.notices.append(
                 f"{path.name}: {missing:,} points have no {name}; it is {'full' if name in CHANNELS else 0} there."
             )
-    if not table.attributes.get(TIMES, np.ones(1)).any():  # as of a whole file
-        del table.attributes[TIMES]
-    if table.attributes.keys() >= set(CHANNELS[:3]):
-        channels = {name: table.attributes.pop(name) for name in CHANNELS if name in table.attributes}
-        if any(channels[name].any() for name in CHANNELS[:3]):
-            color_by(table, channels, path)
+    settle_columns(table, path)
     table.notices += doubts(table, path)
     return table
 
