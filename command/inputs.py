@@ -18,7 +18,7 @@ def add_files(parser, verb):
     )
     parser.add_argument(
         "--part",
-        type=_part,
+        type=parse_share,
         default=(1, 1),
         metavar="K/N",
         help="process the K-th of N equal shares of the inputs only: every N-th file from the K-th on",
@@ -56,8 +56,8 @@ def las_choices(arguments):
     return core.files.LasChoices(core.files.parse_classes(arguments.classes), arguments.withheld)
 
 
-def _part(text):
-    """Parse K/N."""
+def parse_share(text):
+    """Parse K/N, the K-th of N equal shares, for an option."""
     match = re.fullmatch(r"(\d+)/(\d+)", text, re.ASCII)
     number, count = map(int, match.groups()) if match else (0, 0)
     if not 1 <= number <= count:

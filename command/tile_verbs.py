@@ -7,7 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 
 from . import core, tile_work
-from .inputs import add_las_choices, las_choices
+from .inputs import add_las_choices, las_choices, parse_share
 from .records import SUFFIX
 from .rows import TABLES, write_rows, write_text
 from .settings import LAPLACIAN, add_setting, chosen
@@ -120,7 +120,7 @@ class TilesRun(_Cutting):
         ):
 
             def visit_all(step, numbers):
-                return spread(tile_work.visit, [(str(store.folder), step, number) for number in numbers])
+                return spread(core.tiles.visit_tile, [(str(store.folder), step, number) for number in numbers])
 
             core.tiles.run_steps(store, visit_all, stages)
             _write(store, path, store.alive, arguments.tile_format, spread)
@@ -161,7 +161,7 @@ class TilesSurvey(_Stage):
         store = self.store(path)
         waiting = core.tiles.pending(store)
         if store.agreed_after("measure") or waiting[0].name == "measure":
-            return {"step": None, "visited": 0, "waiting": 0, "notices": ["The survey is done: measure the tiles."]}
+            return {**_visit(store, None, arguments.tiles), "notices": ["The survey is done: measure the tiles."]}
         return {**_visit(store, waiting, arguments.tiles), "notices": []}
 
 
@@ -195,13 +195,12 @@ class TilesMeasure(_Stage):
 
     def run(self, path, arguments, output):
         store = self.store(path)
-        waiting, found = core.tiles.pending(store), {"step": None, "visited": 0, "waiting": 0}
+        waiting = core.tiles.pending(store)
         if store.agreed_after("measure"):
             waiting = None
         elif waiting[0].name != "measure":
             raise core.PointCloudError(f"{path} waits for the step {waiting[0].name} of the survey. Take it first.")
-        if waiting is not None:
-            found = _visit(store, waiting, arguments.tiles)
+        found = _visit(store, waiting, arguments.tiles)
         number, count = arguments.tiles
         measured = [tile for tile in store.alive if store.done("measure", tile)]
         mine = [tile for tile in measured if tile % count == number - 1]
@@ -230,9 +229,7 @@ class TilesModes(_Stage):
             raise core.PointCloudError(f"{path} waits for the step {waiting[0].name}. Measure the tiles first.")
         core.tiles.ask_for_modes(store, arguments.modes, arguments.mode_points)
         waiting = core.tiles.pending(store)
-        if waiting is None:
-            return {"step": None, "visited": 0, "waiting": 0, "notices": ["The modes are done."]}
-        return {**_visit(store, waiting, arguments.tiles), "notices": []}
+        return {**_visit(store, waiting, arguments.tiles), "notices": [] if waiting else ["The modes are done."]}
 
 
 class TilesReport(_Stage):
@@ -256,7 +253,9 @@ class TilesReport(_Stage):
 
 
 def _visit(store, waiting, share):
-    """Take a step at a share of the tiles that wait for it."""
+    """Take a step at a share of the tiles that wait for it; none where nothing waits."""
+    if waiting is None:
+        return {"step": None, "visited": 0, "waiting": 0}
     step, numbers = waiting
     mine = [number for number in numbers if number % share[1] == share[0] - 1]
     for number in mine:
@@ -310,7 +309,11 @@ def _check_modes(parser, arguments, least):
 
 def _add_share(parser):
     parser.add_argument(
-        "--tiles", type=_share, default=(1, 1), metavar="K/N", help="take the K-th of N equal shares of the tiles only"
+        "--tiles",
+        type=parse_share,
+        default=(1, 1),
+        metavar="K/N",
+        help="take the K-th of N equal shares of the tiles only",
     )
 
 
@@ -323,13 +326,6 @@ def _add_format(parser, name="--format"):
         default=endings[0],
         help="results of each tile; npy leaves them in the store only, where they are as arrays in any case",
     )
-
-
-def _share(text):
-    number, _, count = text.partition("/")
-    if not (number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count)):
-        raise argparse.ArgumentTypeError(f"{text!r} is not K/N, such as 1/4, with K from 1 to N")
-    return int(number), int(count)
 
 
 def _size(text):

@@ -55,11 +55,6 @@ def tile_path(folder, number, suffix):
     return Path(folder) / f"tile_{number:06d}{suffix}"
 
 
-def visit(store, step, number):
-    """Take a step at a tile of a store, by their names; for workers, which find this by its name."""
-    return core.tiles.visit_tile(store, step, number)
-
-
 def write_tile(store, number, path):
     """Write the results of a tile, with the columns of its points, unless that is done; return its number."""
     path, store = Path(path), core.tiles.Store(store)
@@ -81,9 +76,8 @@ def _table(store, number):
     columns, colors = store.columns(number), None
     channels = [columns.pop(name) for name in core.files.CHANNELS if name in columns]
     if len(channels) >= 3:
-        colors = np.ones((len(channels[0]), 4), np.float32)
-        full = store.manifest["full color"] or 1.0
-        colors[:, : len(channels)] = np.clip(np.stack(channels, axis=1) / full, 0.0, 1.0)
+        alpha = channels[3] if len(channels) > 3 else None
+        colors = core.files.unit_colors(np.stack(channels[:3], axis=1), alpha, store.manifest["full color"])
     measures = {row.attribute: row.of(results) for row in rows_of("analyze")}
     if store.done("modes", number):
         vectors = store.read("modes", number, "modes").T
@@ -147,7 +141,7 @@ def tile_records(store, folder, suffix):
     """Return what a report tells of each tile: its points, area, seconds and notices, or the error."""
     records = []
     for number in range(store.count):
-        path = tile_path(folder, number, suffix) if suffix else store.folder / f"{number:06d}"
+        path = tile_path(folder, number, suffix) if suffix else core.tiles.tile_folder(store.folder, number)
         record = {
             "file": str(path),
             "tile": number,

@@ -112,7 +112,7 @@ def color_by(table: PointTable, channels: dict[str, Array], path: Path) -> None:
         table.notices += depth_notices(colors, path)
 
 
-def unit_colors(colors: Array, alpha: Floats | None = None) -> Array:
+def unit_colors(colors: Array, alpha: Floats | None = None, full: float | None = None) -> Array:
     """Return colors from 0 to 1.
 
     Parameters
@@ -121,16 +121,18 @@ def unit_colors(colors: Array, alpha: Floats | None = None) -> Array:
         Red, green and blue in the range of their file.
     alpha : ndarray, (n,), optional
         In a range of its own.
+    full : float, optional
+        The number of a full color, where these are some of more; else that of them alone, see `full_color`.
 
     Returns
     -------
     ndarray, (n, 4) float32
     """
     result = np.ones((len(colors), 4), np.float32)
-    for unit, given in ((result[:, :3], colors), (result[:, 3], alpha)):
+    for unit, given, known in ((result[:, :3], colors, full), (result[:, 3], alpha, None)):
         if given is not None:
             given = given.view(np.uint8) if given.dtype == np.int8 else given  # which programs use as bytes
-            np.divide(given, np.float32(full_color(given)), out=unit, casting="same_kind")
+            np.divide(given, np.float32(known or full_color(given)), out=unit, casting="same_kind")
     return np.fmin(np.fmax(result, 0.0, out=result), 1.0, out=result)  # NaN becomes 0
 
 

@@ -5,6 +5,6 @@ from .cutting import cut_to_store, points_of_tile
 from .measure import Measured, measure_tile
 from .modes import ask_for_modes
 from .run import pending, run_steps, settle, steps_of, visit_tile
-from .store import Store
+from .store import Store, tile_folder
 from .survey import DEGREE, survey
 from .workers import cores_of_worker, memory_of_worker

@@ -76,26 +76,60 @@ def cut(points: ArrayLike, count: int, halo: float = HALO) -> list[Tile]:
     if not real(halo) >= 0.0:
         raise InvalidPointsError(f"A halo of {halo!r} spacings. Use a number that is not negative.")
     spacing = find_nearest(points).spacing
-    return [_with_halo(points, spacing, own, halo) for own in _divided(points, np.arange(len(points)), int(count))]
+    plan = Plan(points, int(count))
+    tile = plan.tile(points)
+    order, ends = np.argsort(tile, kind="stable"), np.cumsum(np.bincount(tile, minlength=plan.tiles))
+    return [_with_halo(points, spacing, own, halo) for own in np.split(order, ends[:-1])]
 
 
-def _divided(points: Floats, rows: Ints, count: int) -> list[Ints]:
-    """Divide some of the points, by their rows, into so many boxes; fewer where points are at one place."""
-    if count == 1 or len(rows) < 2:
-        return [rows]
-    values = points[rows, np.ptp(points[rows], axis=0).argmax()]
-    left = count // 2
-    level = np.partition(values, left * len(rows) // count)[left * len(rows) // count]
-    below = values < level
-    if not below.any():
-        return [rows]
-    return _divided(points, rows[below], left) + _divided(points, rows[~below], count - left)
+class Plan:
+    """Planes that divide a cloud into tiles, at medians of a sample, each across the longest side."""
+
+    def __init__(self, sample: Floats, tiles: int) -> None:
+        self._nodes: list[tuple[int, float, int, int]] = []  # axis, level, and the nodes below and above; ~ of tiles
+        self.tiles = 0
+        self._root = self._divide(sample, tiles)
+
+    def _divide(self, sample: Floats, tiles: int) -> int:
+        below = np.zeros(0, dtype=bool)
+        if tiles > 1 and len(sample) > 1:
+            axis = int(np.ptp(sample, axis=0).argmax())
+            place = tiles // 2 * len(sample) // tiles
+            level = float(np.partition(sample[:, axis], place)[place])
+            below = sample[:, axis] < level
+        if not below.any():
+            self.tiles += 1
+            return ~(self.tiles - 1)
+        node = len(self._nodes)
+        self._nodes.append((axis, level, 0, 0))
+        left, right = self._divide(sample[below], tiles // 2), self._divide(sample[~below], tiles - tiles // 2)
+        self._nodes[node] = axis, level, left, right
+        return node
+
+    def tile(self, points: Floats) -> Ints:
+        """Return the tile of each point, (k,)."""
+        result = np.empty(len(points), dtype=np.int64)
+        waiting = [(self._root, np.arange(len(points)))]
+        while waiting:
+            node, rows = waiting.pop()
+            if node < 0:
+                result[rows] = ~node
+                continue
+            axis, level, left, right = self._nodes[node]
+            below = points[rows, axis] < level
+            waiting += [(left, rows[below]), (right, rows[~below])]
+        return result
+
+
+def outside(points: Floats, low: Floats, high: Floats) -> Floats:
+    """Return how far points, (k, 3), are outside a box, (k,)."""
+    distance: Floats = np.linalg.norm(np.maximum(np.maximum(low - points, points - high), 0.0), axis=1)
+    return distance
 
 
 def _with_halo(points: Floats, spacing: Floats, own: Ints, halo: float) -> Tile:
-    low, high = points[own].min(axis=0), points[own].max(axis=0)
-    outside = np.linalg.norm(np.maximum(np.maximum(low - points, points - high), 0.0), axis=1)
-    away = outside / np.maximum(spacing, np.median(spacing[own]))  # in spacings
+    distance = outside(points, points[own].min(axis=0), points[own].max(axis=0))
+    away = distance / np.maximum(spacing, np.median(spacing[own]))  # in spacings
     away[own] = 0.0
     inner = np.zeros(len(points), dtype=bool)
     inner[own] = True

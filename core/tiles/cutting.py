@@ -16,12 +16,12 @@ from ..errors import InvalidPointsError, NotEnoughMemoryError, PointCloudError, 
 from ..geometry import FEW, check_points, spacing_of
 from ..memory import needed_memory
 from ..options import LaplacianOptions
-from ..types import Array, Floats, Ints
-from .cut import HALO
+from ..types import Array, Floats
+from .cut import HALO, Plan, outside
 from .shelf import Record, Told
 from .site import Site
 from .steps import Step
-from .store import COLUMNS, POINTS, Store, write_manifest
+from .store import COLUMNS, POINTS, Store, tile_folder, write_manifest
 from .survey import DEGREE
 
 Chunks: TypeAlias = Iterable[tuple[Floats, dict[str, Array]]]  # coordinates, and what is told of the points besides
@@ -89,7 +89,7 @@ def cut_to_store(
     if most < 1:
         raise InvalidPointsError(f"Tiles of {most} points were asked for. Ask for at least one.")
     counted = _count(chunks())
-    plan = _Plan(counted.sample, -(-counted.count // most))
+    plan = Plan(counted.sample, -(-counted.count // most))
     building = folder.with_name(f".{folder.name}.part")
     try:
         shutil.rmtree(building, ignore_errors=True)  # of a cut that was killed
@@ -177,46 +177,7 @@ def _count(chunks: Chunks) -> _Counted:
     return _Counted(count, origin + mean, scale, sample, columns, sorted(names - columns.keys()))
 
 
-class _Plan:
-    """Planes that divide a cloud into tiles, at medians of a sample, each across the longest side."""
-
-    def __init__(self, sample: Floats, tiles: int) -> None:
-        self._nodes: list[tuple[int, float, int, int]] = []  # axis, level, and the nodes below and above; ~ of tiles
-        self.tiles = 0
-        self._root = self._divide(sample, tiles)
-
-    def _divide(self, sample: Floats, tiles: int) -> int:
-        below = np.zeros(0, dtype=bool)
-        if tiles > 1 and len(sample) > 1:
-            axis = int(np.ptp(sample, axis=0).argmax())
-            place = tiles // 2 * len(sample) // tiles
-            level = float(np.partition(sample[:, axis], place)[place])
-            below = sample[:, axis] < level
-        if not below.any():
-            self.tiles += 1
-            return ~(self.tiles - 1)
-        node = len(self._nodes)
-        self._nodes.append((axis, level, 0, 0))
-        left, right = self._divide(sample[below], tiles // 2), self._divide(sample[~below], tiles - tiles // 2)
-        self._nodes[node] = axis, level, left, right
-        return node
-
-    def tile(self, points: Floats) -> Ints:
-        """Return the tile of each point, (k,)."""
-        result = np.empty(len(points), dtype=np.int64)
-        waiting = [(self._root, np.arange(len(points)))]
-        while waiting:
-            node, rows = waiting.pop()
-            if node < 0:
-                result[rows] = ~node
-                continue
-            axis, level, left, right = self._nodes[node]
-            below = points[rows, axis] < level
-            waiting += [(left, rows[below]), (right, rows[~below])]
-        return result
-
-
-def _spread(chunks: Chunks, folder: Path, plan: _Plan, counted: _Counted) -> list[int]:
+def _spread(chunks: Chunks, folder: Path, plan: Plan, counted: _Counted) -> list[int]:
     """Append all points to the files of their tiles, and return how many each has."""
     raw = [folder / f"{number:06d}.raw" for number in range(plan.tiles)]
     for path in raw:
@@ -235,14 +196,14 @@ def _spread(chunks: Chunks, folder: Path, plan: _Plan, counted: _Counted) -> lis
     sizes = []
     for number, path in enumerate(raw):
         table = np.fromfile(path, counted.row)
-        tile_folder = folder / f"{number:06d}"
-        tile_folder.mkdir()
-        np.save(tile_folder / POINTS, table[_PLACE])
+        home = tile_folder(folder, number)
+        home.mkdir()
+        np.save(home / POINTS, table[_PLACE])
         if counted.columns:
             columns = np.empty(len(table), counted.fields)
             for name in counted.columns:
                 columns[name] = table[name]
-            np.save(tile_folder / COLUMNS, columns)
+            np.save(home / COLUMNS, columns)
         path.unlink()
         sizes.append(len(table))
     if sum(sizes) != counted.count:
@@ -282,8 +243,9 @@ def find_halo(site: Site, state: Any) -> tuple[None, Told]:
     near[number] = False
     for other in np.flatnonzero(near).tolist():
         points = shelf.own(other)
-        outside = np.linalg.norm(np.maximum(np.maximum(low - points, points - high), 0.0), axis=1)
-        away = outside / np.maximum(np.maximum(shelf.read("extent", other, "spacing"), usual), 1e-300)
+        away = outside(points, low, high) / np.maximum(
+            np.maximum(shelf.read("extent", other, "spacing"), usual), 1e-300
+        )
         place = np.flatnonzero(away <= halo)
         count += len(place)
         if memory is not None and needed_memory(count, site.options) > memory:

@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components, mini
 
 from ..geometry import ScaledPoints, label_connected
 from ..types import Array, Bools, Floats, Ints
+from .shelf import visited
 
 if TYPE_CHECKING:
     from .shelf import Record, Shelf, Told
@@ -76,11 +77,10 @@ class Merged(NamedTuple):
 
 def merge_labels(shelf: Shelf, step: str) -> Merged:
     """Merge the labels that `label_links` gave in a step, over the points that links reach in other tiles."""
-    alive = [number for number in shelf.alive if shelf.done(step, number)]
     sizes = list(shelf.told(step, "size"))
     start = starts(shelf, step, map(len, sizes))
     edges: list[Ints] = [np.zeros((2, 0), dtype=np.int64)]
-    for number in alive:
+    for number in visited(shelf, step):
         owner, place, reached = (shelf.read(step, number, name) for name in ("owner", "place", "reached"))
         for other in np.unique(owner):
             if shelf.done(step, int(other)):
@@ -102,7 +102,7 @@ def starts(shelf: Shelf, step: str, counts: Iterable[int]) -> Ints:
     ndarray, (tiles + 1,) int
         Up to the last tile that the step has been at.
     """
-    done = np.array([number for number in shelf.alive if shelf.done(step, number)])
+    done = np.array(visited(shelf, step))
     length = np.zeros(done.max() + 2, dtype=np.int64)
     length[done + 1] = list(counts)
     begin: Ints = np.cumsum(length)

@@ -22,9 +22,10 @@ from ..geometry import (
 from ..operator import LaplaceBeltrami, assemble_laplacian, build_laplacian, mean_curvature, solve_areas
 from ..options import LaplacianOptions
 from ..types import Array, Floats, Ints
+from .cut import outside
 from .labels import agree_on_signs, starts
 from .neighborhoods import Fitted, divided
-from .shelf import Part, Record, Shelf, Told
+from .shelf import Part, Record, Shelf, Told, visited
 from .site import Site
 
 _LINK = 1e-3  # weight of links between patches of one tile, against points that two tiles have in common
@@ -72,7 +73,7 @@ def compare_sides(site: Site, fitted: Fitted) -> tuple[None, Told]:
 
 def agree_on_flips(shelf: Shelf, options: LaplacianOptions) -> Record:
     """Agree on which patches are reversed, so that all agree."""
-    alive = [number for number in shelf.alive if shelf.done("sides", number)]
+    alive = visited(shelf, "sides")
     start = starts(shelf, "patches", map(int, shelf.told("patches", "count")))
     votes: list[Array] = []
     for number in alive:
@@ -189,8 +190,7 @@ def _around_center(shelf: Shelf) -> Part:
         found = np.zeros((0, 6))
         away = {}
         for number in shelf.alive:
-            low, high = shelf.bounds(number)
-            away[number] = float(np.linalg.norm(np.maximum(np.maximum(low - middle, middle - high), 0.0)))
+            away[number] = float(outside(middle[None], *shelf.bounds(number))[0])
         for number in sorted(away, key=lambda number: away[number]):
             if len(found) == count and found[-1, 0] < away[number]:
                 break

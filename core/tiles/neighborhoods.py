@@ -36,7 +36,7 @@ from ..options import LaplacianOptions
 from ..types import Floats, Ints
 from .labels import label_links, merge_labels, names_of, starts
 from .medians import median
-from .shelf import Record, Shelf, Told
+from .shelf import Record, Shelf, Told, visited
 from .site import Site
 
 
@@ -126,10 +126,12 @@ def agree_on_noise(shelf: Shelf, options: LaplacianOptions) -> Record:
     """Agree on whether there is noise to smooth, and on the tile that tells of points that fill volumes."""
     if options.projection != "auto":
         return {}
-    alive = [number for number in shelf.alive if shelf.done("noise", number)]
     counts = np.stack(list(shelf.told("noise", "counts")))
     count, noisy, _ = counts.sum(axis=0)
-    return {"noisy": np.array(noisy / count >= MANY), "fullest": np.array(alive[int(counts[:, 2].argmax())])}
+    return {
+        "noisy": np.array(noisy / count >= MANY),
+        "fullest": np.array(visited(shelf, "noise")[int(counts[:, 2].argmax())]),
+    }
 
 
 def find_filling(site: Site, fitted: Fitted) -> tuple[None, Told]:

@@ -76,6 +76,11 @@ class Shelf(Protocol):
         """Note that a tile cannot be measured."""
 
 
+def visited(shelf: Shelf, step: str) -> list[int]:
+    """Return the tiles that can be measured and that a step has been at, in their order, as `Shelf.told` has them."""
+    return [number for number in shelf.alive if shelf.done(step, number)]
+
+
 class Memory:
     """A shelf in memory.
 
@@ -120,7 +125,7 @@ class Memory:
 
     def told(self, step: str, name: str) -> Iterator[Array]:
         """Yield what a step has told of each tile under a name, but for those where it has not been."""
-        return (self.read(step, number, name) for number in self.alive if self.done(step, number))
+        return (self.read(step, number, name) for number in visited(self, step))
 
     def done(self, step: str, number: int) -> bool:
         """Whether a step has been at a tile."""

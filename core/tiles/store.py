@@ -17,7 +17,7 @@ from ..errors import PointCloudError
 from ..files import replacing
 from ..options import LaplacianOptions
 from ..types import Array, Floats
-from .shelf import Part, Record, Told
+from .shelf import Part, Record, Told, visited
 
 VERSION = 1
 POINTS, COLUMNS = "points.npy", "columns.npy"
@@ -134,7 +134,7 @@ class Store:
 
     def told(self, step: str, name: str) -> Iterator[Array]:
         """Yield what a step has told of each tile under a name, but for those where it has not been."""
-        return (self.read(step, number, name) for number in self.alive if self.done(step, number))
+        return (self.read(step, number, name) for number in visited(self, step))
 
     def names(self, step: str, number: int) -> list[str]:
         """Return the names under which a step has told something of a tile."""
@@ -198,7 +198,7 @@ class Store:
         return text
 
     def _tile(self, number: int) -> Path:
-        return self.folder / f"{number:06d}"
+        return tile_folder(self.folder, number)
 
     def _path(self, step: str, number: int) -> Path:
         return self._tile(number) / f"{step}.npz"
@@ -210,6 +210,11 @@ class Store:
 
     def _agreed(self, step: str) -> Path:
         return self.folder / f"agreed-{step}.npz"
+
+
+def tile_folder(folder: Path, number: int) -> Path:
+    """Return the folder of a tile in that of a store."""
+    return folder / f"{number:06d}"
 
 
 def _save(path: Path, arrays: Any) -> None:
