@@ -18,10 +18,11 @@ class ResultVerb(SurfaceVerb):
     operator = ""  # of Blender, which writes the same results
 
     def work(self, path, given, arguments, output, progress):
-        cloud, own = clouds.Cloud(path, given, floaters(arguments)), chosen(self.settings, arguments)
-        wanted = self.wanted(cloud, SimpleNamespace(**own), arguments)
+        cloud = clouds.Cloud(path, given, floaters(arguments))
+        own = SimpleNamespace(**chosen(self.settings, arguments))
+        wanted = self.wanted(cloud, own, arguments)
         built = self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress)
-        told = self.compute(built, wanted, path.stem, SimpleNamespace(**own), progress)
+        told = self.compute(built, wanted, path.stem, own, progress)
         written = [] if output is None else clouds.write(output, given, told.values)
         return {"points": len(cloud.points), "done": told.line}, [
             *built.laplacian.notices,
