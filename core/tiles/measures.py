@@ -22,10 +22,10 @@ from ..geometry import (
 from ..operator import LaplaceBeltrami, assemble_laplacian, build_laplacian, mean_curvature, solve_areas
 from ..options import LaplacianOptions
 from ..types import Array, Floats, Ints
-from .cut import outside
 from .labels import agree_on_signs, starts
 from .neighborhoods import Fitted, divided
-from .shelf import Part, Record, Shelf, Told, visited
+from .shelf import Record, Shelf, Told, visited
+from .places import points_around
 from .site import Site
 
 _LINK = 1e-3  # weight of links between patches of one tile, against points that two tiles have in common
@@ -129,7 +129,8 @@ def agree_on_areas(shelf: Shelf, options: LaplacianOptions) -> Record:
 
 def share_weights(site: Site, state: object) -> tuple[None, Told]:
     """Balance the weights of the points around the center, for what each round takes from the earlier ones."""
-    part = _around_center(site.shelf)
+    middle = points_around(site.shelf, site.record["center"], 1).points[0]
+    part = points_around(site.shelf, middle, _TRIAL)
     trial = build_laplacian(part.points, options=site.options, agreed=Site(site.shelf, -1, site.options, part).agreed())
     shares = trial.agreed.shares or ()
     flat = np.array([share for step in shares for share in step], dtype=float)
@@ -181,26 +182,3 @@ def _added(shelf: Shelf, step: str, name: str) -> Floats:
     for label, part in zip(names, parts, strict=True):
         total[label] += part
     return total
-
-
-def _around_center(shelf: Shelf) -> Part:
-    """Return the points around the one that is next to the center of all."""
-    middle = shelf.record["center"]
-    for count in (1, _TRIAL):
-        found = np.zeros((0, 6))
-        away = {}
-        for number in shelf.alive:
-            away[number] = float(outside(middle[None], *shelf.bounds(number))[0])
-        for number in sorted(away, key=lambda number: away[number]):
-            if len(found) == count and found[-1, 0] < away[number]:
-                break
-            points = shelf.own(number)
-            distance = np.linalg.norm(points - middle, axis=1)
-            near = np.argsort(distance, kind="stable")[:count]
-            rows = np.column_stack([distance[near], np.full(len(near), number), near, points[near]])
-            found = np.concatenate([found, rows])
-            found = found[np.argsort(found[:, 0], kind="stable")[:count]]
-        middle = found[0, 3:]
-    owner, place = found[:, 1].astype(np.int64), found[:, 2].astype(np.int64)
-    every = np.ones(len(found), dtype=bool)
-    return Part(found[:, 3:], every, every, owner, place)

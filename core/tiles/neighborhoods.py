@@ -36,8 +36,12 @@ from ..options import LaplacianOptions
 from ..types import Floats, Ints
 from .labels import label_links, merge_labels, names_of, starts
 from .medians import median
-from .shelf import Record, Shelf, Told, visited
+from .shelf import Record, Shelf, Told
+from .places import points_around
 from .site import Site
+
+
+_FILLED = 50_000  # points by which that is judged which fill volumes
 
 
 class Fitted(NamedTuple):
@@ -113,38 +117,49 @@ def find_noise(site: Site, sample: Sample) -> tuple[Fitted, Told]:
     """Fit quadrics, and measure the noise."""
     sample = divide_components(replace(sample, decisions=site.decisions()), site.needed)
     surface = with_scatter(fit_surface(sample, site.options.sheets))
-    inner = site.inner(surface.sample.scaled)
     if site.options.projection != "auto":
-        return Fitted(surface, None), {"counts": np.array([np.count_nonzero(inner), 0, 0])}
+        return Fitted(surface), {}
     near = near_misfit(surface.sample.nearest)
-    noise = measure_noise(surface, near)[inner]
-    counts = [np.count_nonzero(inner), np.count_nonzero(noise > 0.0), np.count_nonzero(noise > FILLING)]
-    return Fitted(surface, near), {"counts": np.array(counts)}
-
-
-def agree_on_noise(shelf: Shelf, options: LaplacianOptions) -> Record:
-    """Agree on whether there is noise to smooth, and on the tile that tells of points that fill volumes."""
-    if options.projection != "auto":
-        return {}
-    counts = np.stack(list(shelf.told("noise", "counts")))
-    count, noisy, _ = counts.sum(axis=0)
-    return {
-        "noisy": np.array(noisy / count >= MANY),
-        "fullest": np.array(visited(shelf, "noise")[int(counts[:, 2].argmax())]),
+    noise = measure_noise(surface, near)
+    inner = site.inner(surface.sample.scaled)
+    fills = site.own(surface.sample.scaled, noise > FILLING, False)
+    offset = site.part.points[site.part.inner][fills] - site.record["center"]
+    return Fitted(surface, near), {
+        "counts": np.array([np.count_nonzero(inner), np.count_nonzero(noise[inner] > 0.0), len(offset)]),
+        "fills": fills,
+        "offset": offset.sum(axis=0),
     }
 
 
-def find_filling(site: Site, fitted: Fitted) -> tuple[None, Told]:
-    """Follow how points that fill volumes fare as noise is smoothed."""
-    found = remove_noise(_with_decisions(site, fitted.surface), site.options, fitted.near)
+def agree_on_noise(shelf: Shelf, options: LaplacianOptions) -> Record:
+    """Agree on whether there is noise to smooth, and on the middle of the points that fill volumes."""
+    if options.projection != "auto":
+        return {}
+    counts = np.stack(list(shelf.told("noise", "counts")))
+    count, noisy, filling = counts.sum(axis=0)
+    agreed = {"noisy": np.array(noisy / count >= MANY)}
+    if filling:
+        agreed["filled"] = shelf.record["center"] + np.sum(list(shelf.told("noise", "offset")), axis=0) / filling
+    return agreed
+
+
+def find_filling(site: Site, state: object) -> tuple[None, Told]:
+    """Follow how points that fill volumes fare as noise is smoothed, around the one next to the middle of all."""
+    shelf = site.shelf
+    middle = points_around(shelf, site.record["filled"], 1, "fills").points[0]
+    trial = Site(shelf, -1, site.options, points_around(shelf, middle, _FILLED))
+    sample, _ = find_spacing(trial, None)
+    left, _ = find_reach(trial, sample)
+    fitted, _ = find_noise(trial, left or sample)
+    found = remove_noise(_with_decisions(trial, fitted.surface), site.options, fitted.near)
     filling = found.sample.decisions.made.filling
     return None, {"filling": np.array(() if filling is None else filling)}
 
 
 def agree_on_filling(shelf: Shelf, options: LaplacianOptions) -> Record:
     """Agree on that."""
-    told = [filling for filling in shelf.told("filling", "filling") if len(filling)]
-    return {"filling": told[0]} if told else {}
+    told = list(shelf.told("filling", "filling"))
+    return {"filling": told[0]} if told and len(told[0]) else {}
 
 
 def link_sheets(site: Site, fitted: Fitted) -> tuple[Fitted | None, Told]:

@@ -25,8 +25,8 @@ def at_first(shelf: Shelf) -> Sequence[int]:
     return shelf.alive[:1]
 
 
-def _fullest(shelf: Shelf) -> Sequence[int]:
-    return [int(shelf.record["fullest"])] if "fullest" in shelf.record else []
+def _at_first_if_filled(shelf: Shelf) -> Sequence[int]:
+    return at_first(shelf) if "filled" in shelf.record else []
 
 
 def _nothing(shelf: Shelf, options: LaplacianOptions) -> Record:
@@ -64,7 +64,7 @@ _SURVEY = (
     Step("gaps", neighborhoods.link_strictly, neighborhoods.agree_on_large),
     Step("components", neighborhoods.link_loosely, neighborhoods.agree_on_components),
     Step("noise", neighborhoods.find_noise, neighborhoods.agree_on_noise),
-    Step("filling", neighborhoods.find_filling, neighborhoods.agree_on_filling, _fullest),
+    Step("filling", neighborhoods.find_filling, neighborhoods.agree_on_filling, _at_first_if_filled),
     Step("sheets", neighborhoods.link_sheets, neighborhoods.agree_on_large_sheets),
     Step("touching", neighborhoods.join_sheets, neighborhoods.agree_on_sheets, of_sheets=True),
     Step("patches", measures.orient_tile),

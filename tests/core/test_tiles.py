@@ -182,3 +182,15 @@ class TestLabels:
         # A chain of three patches, the second reversed; one false vote between the ends, and a patch alone.
         sign = agree_on_signs(np.array([0, 1, 0, 1]), np.array([1, 2, 2, 0]), np.array([-4.0, -7.0, -1.0, -5.0]), 4)
         np.testing.assert_array_equal(sign, [1.0, -1.0, 1.0, 1.0])
+
+
+def test_points_that_fill_volumes_are_judged_alike_however_the_cloud_is_cut():
+    rng = np.random.default_rng(0)
+    ground = np.column_stack([rng.uniform(0.0, 40.0, 3000), rng.uniform(0.0, 10.0, 3000), np.zeros(3000)])
+    leaves = [
+        size * rng.normal(size=(400, 3)) + place for size, place in ((0.8, [8.0, 5.0, 6.0]), (1.4, [30.0, 5.0, 6.0]))
+    ]
+    points = np.concatenate([ground, *leaves])
+    first, second = (core.tiles.survey(points, core.tiles.cut(points, count, 6.0)).filling for count in (2, 5))
+    assert first[0] > 0.4  # of the spacing
+    np.testing.assert_allclose(first, second, rtol=1e-9)

@@ -1,0 +1,37 @@
+"""Points around a place, of whatever tiles."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..types import Floats
+from .cut import outside
+from .shelf import Part, Shelf
+
+
+def points_around(shelf: Shelf, place: Floats, count: int, marked: str = "") -> Part:
+    """Return so many points of all tiles that are next to a place, nearest first.
+
+    Parameters
+    ----------
+    shelf : Shelf
+    place : ndarray, (3,)
+    count : int
+    marked : str
+        Only those that the step "noise" has marked under this name.
+    """
+    found = np.zeros((0, 6))
+    away = {number: float(outside(place[None], *shelf.bounds(number))[0]) for number in shelf.alive}
+    for number in sorted(away, key=lambda number: away[number]):
+        if len(found) == count and found[-1, 0] < away[number]:
+            break
+        points = shelf.own(number)
+        rows = np.flatnonzero(shelf.read("noise", number, marked)) if marked else np.arange(len(points))
+        distance = np.linalg.norm(points[rows] - place, axis=1)
+        near = np.argsort(distance, kind="stable")[:count]
+        columns = [distance[near], np.full(len(near), number), rows[near], points[rows[near]]]
+        found = np.concatenate([found, np.column_stack(columns)])
+        found = found[np.argsort(found[:, 0], kind="stable")[:count]]
+    owner, place = found[:, 1].astype(np.int64), found[:, 2].astype(np.int64)
+    every = np.ones(len(found), dtype=bool)
+    return Part(found[:, 3:], every, every, owner, place)
