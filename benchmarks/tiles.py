@@ -1,4 +1,5 @@
-"""Tiles against the whole cloud: ``python -m benchmarks.tiles [points [tiles [halo]]]``.
+"""Tiles against the whole cloud: ``python -m benchmarks.tiles torus [points [tiles [halo [degree]]]]``, and ``zoo`` for
+the shapes in the folder MESHFREE_ZOO; both on random points and with noise, and by another cut besides.
 
 Differences are the largest in the whole cloud, relative to the largest value, of areas and lengths to their own.
 
@@ -18,63 +19,88 @@ from scipy import sparse
 
 import core
 
+from .real_shapes import noisy_points, random_points, shapes
 from .samplings import torus_points
 
-TARGET = {"random": 1e-6, "noisy": 1e-5}
 WHOLE = 200_000  # points of the cloud that CPU seconds are held against
 NOISE = 0.2  # of the spacing
-VALUES = ("normals", "quadric_mean_curvature", "smoothing_lengths", "areas", "boundary")
+FIRST = ("normals", "quadric_mean_curvature", "smoothing_lengths")
+SOLVED = ("areas", "mean_curvature", "stiffness")
+LABELS = ("boundary", "component", "sides")
 
 
-def compare(name, points, count, halo):
-    """Print the largest differences between tiles and the whole, both by the record of the survey."""
-    began = time.process_time()
+def in_tiles(points, count, halo, degree):
+    """Measure a cloud in tiles; return its quantities in the order of the points, and the record."""
     tiles = core.tiles.cut(points, count, halo)
-    agreed = core.tiles.survey(points, tiles)
-    surveyed = time.process_time()
+    agreed = core.tiles.survey(points, tiles, degree=degree)
     parts = [core.tiles.measure_tile(points, tile, agreed) for tile in tiles]
-    measured = time.process_time()
-    whole = core.build_laplacian(points, agreed=agreed)
-    curvature = core.mean_curvature(whole)
-    ended = time.process_time()
     order = np.argsort(np.concatenate([part.rows for part in parts]))
-
-    def joined(quantity):
-        return np.concatenate([getattr(part, quantity) for part in parts])[order]
-
-    on = whole.component >= 0
     found = {
-        quantity: np.abs(joined(quantity)[on].astype(float) - getattr(whole, quantity)[on]).max()
-        / np.abs(getattr(whole, quantity)[on].astype(float)).max(initial=1e-300)
-        for quantity in VALUES
+        name: np.concatenate([getattr(part, name) for part in parts])[order]
+        for name in (*FIRST, *SOLVED[:-1], *LABELS[:-1])
     }
-    found["areas"] = np.abs(joined("areas") / whole.areas - 1.0)[on].max()
-    found["mean_curvature"] = np.abs(joined("mean_curvature") - curvature)[on].max() / np.abs(curvature[on]).max()
-    rows = sparse.vstack([part.stiffness for part in parts]).tocsr()[order]
-    found["rows of the matrix"] = abs(rows - whole.stiffness).max() / abs(whole.stiffness).max()
+    found["stiffness"] = sparse.vstack([part.stiffness for part in parts]).tocsr()[order]
+    found["sides"] = np.sign(np.einsum("ij,ij->i", found["normals"], agreed.side))
     share = sum(len(tile.rows) for tile in tiles) / len(points)
-    print(f"{name}: {len(points):,} points in {len(tiles)} tiles, with halos {share:.2f} times as many")
-    for quantity, value in found.items():
-        print(f"  {quantity}: {value:.0e} (target {TARGET[name]:.0e})")
-    print(f"  total area: {abs(joined('areas').sum() / whole.areas.sum() - 1.0):.0e} (target 1e-09)")
-    print(f"  other components: {np.count_nonzero(joined('component') != whole.component)} points (target 0)")
-    own = core.build_laplacian(points).agreed
-    print(
-        f"  other signs than of the whole's own record: {np.count_nonzero((agreed.side * own.side).sum(axis=1) < 0.0)}"
-    )
-    print(
-        f"  CPU seconds: survey {surveyed - began:.0f}, tiles {measured - surveyed:.0f}, whole {ended - measured:.0f}",
-        flush=True,
-    )
+    return found, agreed, share
 
 
-def main(count=400_000, tiles=8, halo=core.tiles.HALO):
+def as_a_whole(points, agreed):
+    """Measure a cloud as a whole by a record."""
+    whole = core.build_laplacian(points, agreed=agreed)
+    found = {name: getattr(whole, name) for name in (*FIRST, "areas", "stiffness", "boundary", "component")}
+    found["mean_curvature"] = core.mean_curvature(whole)
+    found["sides"] = np.sign(np.einsum("ij,ij->i", whole.normals, agreed.side))
+    return found
+
+
+def differences(found, wanted):
+    """Return the largest differences, by quantity, and how many labels differ."""
+    on = wanted["component"] >= 0
+    result = {}
+    for name in (*FIRST, "mean_curvature"):
+        result[name] = np.abs(found[name] - wanted[name])[on].max() / np.abs(wanted[name])[on].max()
+    result["areas"] = np.abs(found["areas"] / wanted["areas"] - 1.0)[on].max()
+    result["stiffness"] = abs(found["stiffness"] - wanted["stiffness"]).max() / abs(wanted["stiffness"]).max()
+    result["total area"] = abs(found["areas"].sum() / wanted["areas"].sum() - 1.0)
+    result["labels"] = sum(np.count_nonzero(found[name] != wanted[name]) for name in LABELS)
+    return result
+
+
+def compare(name, points, count, halo, degree):
+    """Print the largest differences between tiles, the whole by the same record, and another cut."""
+    began = time.process_time()
+    found, agreed, share = in_tiles(points, count, halo, degree)
+    ended = time.process_time()
+    wanted = as_a_whole(points, agreed)
+    whole = time.process_time() - ended
+    own = core.build_laplacian(points, agreed=core.geometry.Agreed(degree=degree)).agreed
+    flipped = np.count_nonzero((agreed.side * own.side).sum(axis=1) < 0.0)
+    other, _, _ = in_tiles(points, count + 1, halo, degree)
+    print(
+        f"{name}: {len(points):,} points in {count} tiles, {share:.2f} times as many with halos; sides other than of"
+        f" the whole's own record: {flipped}; CPU seconds {ended - began:.0f}, as a whole {whole:.0f}"
+    )
+    for title, against in (("whole", wanted), ("other cut", other)):
+        values = differences(found, against)
+        print(f"  {title}:", ", ".join(f"{quantity} {value:.0e}" for quantity, value in values.items()), flush=True)
+
+
+def torus(count=400_000, tiles=8, halo=core.tiles.HALO, degree=core.tiles.DEGREE):
     """Compare on a torus, without noise and with it."""
     points = torus_points(int(count))
-    compare("random", points, int(tiles), float(halo))
+    compare("torus", points, int(tiles), float(halo), int(degree))
     spacing = np.sqrt(core.estimate_areas(points[:: max(1, len(points) // 2000)]).sum() / len(points))
     noise = NOISE * spacing * np.random.default_rng(1).normal(size=points.shape)
-    compare("noisy", points + noise, int(tiles), float(halo))
+    compare("torus, noisy", points + noise, int(tiles), float(halo), int(degree))
+
+
+def zoo(count=100_000, tiles=4, halo=core.tiles.HALO, degree=core.tiles.DEGREE):
+    """Compare on real shapes, without noise and with it."""
+    for name, (vertices, faces, _) in shapes().items():
+        compare(name, random_points(vertices, faces, int(count))[0], int(tiles), float(halo), int(degree))
+        noisy = noisy_points(vertices, faces, int(count), NOISE)
+        compare(f"{name}, noisy", noisy, int(tiles), float(halo), int(degree))
 
 
 def store(count=1_000_000, most=250_000, halo=core.tiles.HALO, degree=core.tiles.DEGREE, folder=""):
@@ -123,7 +149,4 @@ def store(count=1_000_000, most=250_000, halo=core.tiles.HALO, degree=core.tiles
 
 
 if __name__ == "__main__":
-    if sys.argv[1:2] == ["store"]:
-        store(*sys.argv[2:])
-    else:
-        main(*sys.argv[1:])
+    {"store": store, "torus": torus, "zoo": zoo}[sys.argv[1]](*sys.argv[2:])

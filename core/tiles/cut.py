@@ -12,7 +12,7 @@ from ..errors import InvalidPointsError
 from ..geometry import check_points, find_nearest
 from ..types import Bools, Floats, Ints
 
-HALO = 60.0  # spacings, at which all results of a tile are those of the whole cloud to 1e-6, see docs/tiles.md
+HALO = 45.0  # spacings, at which all results of a tile are those of the whole cloud to 1e-6, see docs/tiles.md
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,8 +24,8 @@ from ..options import LaplacianOptions
 from ..types import Array, Floats, Ints
 from .labels import agree_on_signs, starts
 from .neighborhoods import Fitted, divided
-from .shelf import Record, Shelf, Told, visited
 from .places import points_around
+from .shelf import Record, Shelf, Told, visited
 from .site import Site
 
 _LINK = 1e-3  # weight of links between patches of one tile, against points that two tiles have in common

@@ -36,10 +36,9 @@ from ..options import LaplacianOptions
 from ..types import Floats, Ints
 from .labels import label_links, merge_labels, names_of, starts
 from .medians import median
-from .shelf import Record, Shelf, Told
 from .places import points_around
+from .shelf import Record, Shelf, Told
 from .site import Site
-
 
 _FILLED = 50_000  # points by which that is judged which fill volumes
 

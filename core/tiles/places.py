@@ -32,6 +32,6 @@ def points_around(shelf: Shelf, place: Floats, count: int, marked: str = "") -> 
         columns = [distance[near], np.full(len(near), number), rows[near], points[rows[near]]]
         found = np.concatenate([found, np.column_stack(columns)])
         found = found[np.argsort(found[:, 0], kind="stable")[:count]]
-    owner, place = found[:, 1].astype(np.int64), found[:, 2].astype(np.int64)
+    owner, row = found[:, 1:3].astype(np.int64).T
     every = np.ones(len(found), dtype=bool)
-    return Part(found[:, 3:], every, every, owner, place)
+    return Part(found[:, 3:], every, every, owner, row)

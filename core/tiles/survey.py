@@ -17,7 +17,7 @@ from .shelf import Memory, Part
 from .site import Site
 from .steps import agree, survey_steps, visit
 
-DEGREE = 24  # of the polynomials for areas: they reach less than a halo of 60 spacings, see docs/tiles.md
+DEGREE = 12  # of the polynomials for areas: they reach less than a halo of 45 spacings, see docs/tiles.md
 
 
 def survey(
@@ -39,8 +39,8 @@ def survey(
     options : LaplacianOptions
         Settings.
     degree : int
-        Of the polynomials that solve for areas. A lower one asks for less of a halo: 12 for 45 spacings. An operator of
-        all points at once has 100.
+        Of the polynomials that solve for areas. A higher one asks for more of a halo: 24 for 60 spacings. An operator
+        of all points at once has 100.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 

@@ -56,7 +56,7 @@ class TestRun:
         assert sum(len(table.points) for table in tables) == COUNT
         area = sum(table.attributes["lb_area"].astype(float).sum() for table in tables)
         points = np.concatenate([read_points(scans / f"{name}.ply").points for name in "ab"])
-        whole = core.build_laplacian(points, agreed=core.geometry.Agreed(degree=24))
+        whole = core.build_laplacian(points, agreed=core.geometry.Agreed(degree=core.tiles.DEGREE))
         assert abs(area / whole.areas.sum() - 1.0) < 1e-6
         for table in tables:
             half = table.points[:, 0] >= 0.5 * LENGTH
