@@ -13,7 +13,6 @@ from ..geometry import (
     Decisions,
     arc_length,
     measure_surface,
-    mirrored_cosine,
     near_edges,
     orient_patches,
     side_sums,
@@ -45,18 +44,17 @@ def orient_tile(site: Site, fitted: Fitted) -> tuple[Fitted | None, Told]:
     nearest, scaled = surface.sample.nearest, surface.sample.scaled
     normals, patch = orient_patches(nearest, surface.quadrics.normals, surface.sample.places)
     first, second = near_edges(nearest)
-    alike = np.sign(mirrored_cosine(nearest.points, normals, first, second))
     count = int(patch.max()) + 1
-    votes = sparse.coo_array((alike, (patch[first], patch[second])), shape=(count, count)).tocsr().tocoo()
-    across = votes.row != votes.col
+    edges = sparse.coo_array((np.ones(len(first)), (patch[first], patch[second])), shape=(count, count)).tocsr().tocoo()
+    across = edges.row != edges.col
     return Fitted(surface) if changed else None, {
         "normal": site.own(scaled, normals, 0.0),
         "patch": site.own(scaled, patch, -1),
         "normals": normals,  # of all distinct points, with the halo
         "patches": patch,
         "count": np.array(count),
-        "links": np.stack([votes.row, votes.col], axis=1)[across],
-        "votes": votes.data[across],
+        "links": np.stack([edges.row, edges.col], axis=1)[across],
+        "edges": edges.data[across],
     }
 
 
@@ -77,8 +75,8 @@ def agree_on_flips(shelf: Shelf, options: LaplacianOptions) -> Record:
     start = starts(shelf, "patches", map(int, shelf.told("patches", "count")))
     votes: list[Array] = []
     for number in alive:
-        links, alike = shelf.read("patches", number, "links"), shelf.read("patches", number, "votes")
-        votes.append(np.column_stack([links + start[number], _LINK * alike]))
+        links, edges = shelf.read("patches", number, "links"), shelf.read("patches", number, "edges")
+        votes.append(np.column_stack([links + start[number], _LINK * edges]))
         pairs, alike = shelf.read("sides", number, "pairs"), shelf.read("sides", number, "votes")
         known = np.isin(pairs[:, 1], alive)  # not one that has failed since
         pairs, alike = pairs[known], alike[known]

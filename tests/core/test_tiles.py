@@ -194,3 +194,14 @@ def test_points_that_fill_volumes_are_judged_alike_however_the_cloud_is_cut():
     first, second = (core.tiles.survey(points, core.tiles.cut(points, count, 6.0)).filling for count in (2, 5))
     assert first[0] > 0.4  # of the spacing
     np.testing.assert_allclose(first, second, rtol=1e-9)
+
+
+def test_sides_where_sheets_come_close_are_those_of_the_whole():
+    rng = np.random.default_rng(1)
+    along, angle = rng.uniform(0.0, LENGTH, 3000), rng.uniform(0.0, 2.0 * np.pi, 3000)
+    points = np.column_stack([along, 0.25 * np.cos(angle), 0.05 * np.sin(angle)])  # a flat tube
+    found = core.tiles.survey(points, core.tiles.cut(points, 4, HALO)).side
+    wanted = core.build_laplacian(points, agreed=LOW).agreed
+    on = wanted.component >= 0
+    assert np.mean(on) > 0.99
+    assert np.all(np.einsum("ij,ij->i", found, wanted.side)[on] > 0.0)
