@@ -44,7 +44,7 @@ from .pairs import Pairs, find_pairs
 from .patches import Patch
 from .points import FEWEST, ScaledPoints, as_indices, as_mask, check_points, check_values, scale_points
 from .prolongation import Prolongation, balanced_weights
-from .quadrics import CURVED, MANY, check_surface, frames, roundness
+from .quadrics import CURVED, MANY, check_surface, count_curves, frames, roundness
 from .rows import look_across_rows
 from .sheets import choose_bridges, join_touching, same_sheet, sheet_neighbors
 from .strays import PARTS, label_parts, stray_scores, without

@@ -25,7 +25,7 @@ from .normals import unit_normals
 from .outliers import find_outliers
 from .pairs import Pairs, find_pairs
 from .points import ScaledPoints, as_mask, check_boundary, check_distances, check_points, scale_points
-from .quadrics import MANY, Quadrics, check_surface, frames
+from .quadrics import MANY, Quadrics, check_surface, count_curves, frames
 from .rows import look_across_rows
 from .sheets import Sheets, fit_sheets, label_sheets, separate_sheets
 from .winding import orient_by_winding
@@ -397,7 +397,7 @@ def fit_surface(sample: Sample, sheets: bool, before: Surface | None = None, cha
     """
     nearest = sample.nearest
     if sample.decisions.whole:
-        check_surface(nearest.quadrics.roundness)
+        check_surface(count_curves(nearest.quadrics.roundness), len(nearest.points))
     if not sheets:
         return Surface(sample, nearest.quadrics)
     fitted = fit_sheets(nearest, before.sheets if before else None, changed)

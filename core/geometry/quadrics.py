@@ -149,15 +149,19 @@ def roundness(variances: Floats) -> Floats:
     return variances[:, 1] / np.maximum(variances[:, 2], 1e-300)
 
 
-def check_surface(roundness: Floats) -> None:
-    """Check that the points are those of a surface, by how round their neighbourhoods are, (m,).
+def count_curves(roundness: Floats) -> int:
+    """Return around how many points the neighbours lie along a curve, by how round their neighbourhoods are, (m,)."""
+    return int(np.count_nonzero(roundness < _CURVE))
+
+
+def check_surface(curves: int, count: int) -> None:
+    """Check that so many points are those of a surface, by `count_curves`.
 
     Raises
     ------
     NotASurfaceError
         The points of many neighbourhoods lie along a curve.
     """
-    curves, count = np.count_nonzero(roundness < _CURVE), len(roundness)
     if curves > MANY * count:
         raise NotASurfaceError(
             f"Around {curves} of {count} points the neighbors lie along a curve, so there is no tangent plane."

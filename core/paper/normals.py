@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..algebra import blocks, on_all_cores
-from ..geometry import Pairs, check_surface, fading_weights, roundness
+from ..geometry import Pairs, check_surface, count_curves, fading_weights, roundness
 from ..kernel import kernel
 from ..types import Floats
 
@@ -48,7 +48,7 @@ def covariance_normals(pairs: Pairs, weighted: bool = True) -> Floats:
         moments[:, 4:] - mean[:, axes[0]] * mean[:, axes[1]]
     )
     variances, directions = np.linalg.eigh(covariance)
-    check_surface(roundness(variances))
+    check_surface(count_curves(roundness(variances)), len(variances))
     return np.ascontiguousarray(directions[:, :, 0])
 
 

@@ -14,7 +14,9 @@ from ..geometry import (
     Sample,
     Surface,
     check_points,
+    check_surface,
     choose_bridges,
+    count_curves,
     divide_components,
     divide_sheets,
     drop_outliers,
@@ -116,26 +118,33 @@ def find_noise(site: Site, sample: Sample) -> tuple[Fitted, Told]:
     """Fit quadrics, and measure the noise."""
     sample = divide_components(replace(sample, decisions=site.decisions()), site.needed)
     surface = with_scatter(fit_surface(sample, site.options.sheets))
+    inner = site.inner(surface.sample.scaled)
+    curves = count_curves(surface.sample.nearest.quadrics.roundness[inner])
     if site.options.projection != "auto":
-        return Fitted(surface), {}
+        return Fitted(surface), {"counts": np.array([np.count_nonzero(inner), curves, 0, 0])}
     near = near_misfit(surface.sample.nearest)
     noise = measure_noise(surface, near)
-    inner = site.inner(surface.sample.scaled)
     fills = site.own(surface.sample.scaled, noise > FILLING, False)
     offset = site.part.points[site.part.inner][fills] - site.record["center"]
     return Fitted(surface, near), {
-        "counts": np.array([np.count_nonzero(inner), np.count_nonzero(noise[inner] > 0.0), len(offset)]),
+        "counts": np.array([np.count_nonzero(inner), curves, np.count_nonzero(noise[inner] > 0.0), len(offset)]),
         "fills": fills,
         "offset": offset.sum(axis=0),
     }
 
 
 def agree_on_noise(shelf: Shelf, options: LaplacianOptions) -> Record:
-    """Agree on whether there is noise to smooth, and on the middle of the points that fill volumes."""
+    """Agree on whether there is noise to smooth, and on the middle of the points that fill volumes.
+
+    Raises
+    ------
+    NotASurfaceError
+        The points of many neighbourhoods lie along a curve.
+    """
+    count, curves, noisy, filling = np.sum(list(shelf.told("noise", "counts")), axis=0).tolist()
+    check_surface(curves, count)
     if options.projection != "auto":
         return {}
-    counts = np.stack(list(shelf.told("noise", "counts")))
-    count, noisy, filling = counts.sum(axis=0)
     agreed = {"noisy": np.array(noisy / count >= MANY)}
     if filling:
         agreed["filled"] = shelf.record["center"] + np.sum(list(shelf.told("noise", "offset")), axis=0) / filling

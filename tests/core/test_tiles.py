@@ -205,3 +205,10 @@ def test_sides_where_sheets_come_close_are_those_of_the_whole():
     on = wanted.component >= 0
     assert np.mean(on) > 0.99
     assert np.all(np.einsum("ij,ij->i", found, wanted.side)[on] > 0.0)
+
+
+def test_curves_are_no_surface_in_tiles_either():
+    angle = np.linspace(0.0, 2.0 * np.pi, 3000, endpoint=False)
+    circle = np.column_stack([np.cos(angle), np.sin(angle), 0.2 * np.sin(3.0 * angle)])
+    with pytest.raises(core.NotASurfaceError, match="along a curve"):
+        core.tiles.survey(circle, core.tiles.cut(circle, 3, 10.0))
