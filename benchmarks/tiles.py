@@ -5,16 +5,21 @@ Differences are the largest in the whole cloud, relative to the largest value, o
 
 ``python -m benchmarks.tiles store [points [tile_points [halo [degree [folder]]]]]`` walks over tiles on disk in this
 process, and prints CPU seconds a point beside those of a cloud of 200,000, the most memory, and the bytes on disk; a
-folder that exists is gone on with.
+folder that exists is gone on with. ``run [points [workers [memory [tile_points [folder]]]]]`` does the same by `tiles
+run` with several workers, and tells the most memory of each.
 """
 
+import json
+import os
 import resource
+import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
 
 import numpy as np
+import psutil
 from scipy import sparse
 
 import core
@@ -22,6 +27,8 @@ import core
 from .real_shapes import noisy_points, random_points, shapes
 from .samplings import torus_points
 
+ROOT = Path(__file__).parents[1]
+PROGRAM = "import sys; from command.main import main; sys.exit(main())"
 WHOLE = 200_000  # points of the cloud that CPU seconds are held against
 NOISE = 0.2  # of the spacing
 FIRST = ("normals", "quadric_mean_curvature", "smoothing_lengths")
@@ -133,20 +140,70 @@ def store(count=1_000_000, most=250_000, halo=core.tiles.HALO, degree=core.tiles
         within = sum(len(tiles.own(number)) for number in tiles.alive)
         around = sum(len(tiles.part(number).points) for number in tiles.alive)
         final = sum(path.stat().st_size for path in place.rglob("*.*"))
-    seconds = cut + sum(spent.values())
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     print(f"{count:,} points in {tiles.count} tiles, with halos {around / within:.2f} times as many")
     print("  CPU seconds:", ", ".join(f"{name} {value:.1f}" for name, value in {"cut": cut, **spent}.items() if name))
     print(f"  most memory {memory:.2f} GB, on disk {disk / count:.0f} bytes a point, at the end {final / count:.0f}")
+    beside_whole(count, cut + sum(spent.values()))
+
+
+def run(count=5_000_000, workers=2, memory="2GB", most=0, folder=""):
+    """Measure what `tiles run` costs with several workers."""
+    count, most = int(count), int(most)
+    with tempfile.TemporaryDirectory() as temporary:
+        place = Path(folder or temporary)
+        source, out = place / "points.npy", place / "out"
+        if not source.exists():
+            np.save(source, torus_points(count))
+        words = ["tiles", "run", source, "--out-dir", out, "--workers", workers, "--memory", memory, "--format", "npy"]
+        words += ["--tile-points", most] if most else []
+        known = {**os.environ, "PYTHONPATH": str(ROOT)}
+        began, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
+        running = subprocess.Popen([sys.executable, "-c", PROGRAM, *map(str, words)], env=known, stdout=subprocess.PIPE)
+        used = {}
+        while running.poll() is None:
+            for pid, size in memory_used(running.pid).items():
+                used[pid] = max(used.get(pid, 0), size)
+            time.sleep(0.5)
+        took, after = time.perf_counter() - began, resource.getrusage(resource.RUSAGE_CHILDREN)
+        told = json.loads(running.stdout.read().splitlines()[-1])
+        tiles = core.tiles.Store(out / "store")
+        around = sum(len(tiles.part(number).points) for number in tiles.alive)
+    seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    print(
+        f"{count:,} points in {told['tiles']} tiles, {told['failed_tiles']} failed, with halos"
+        f" {around / told['points']:.2f} times as many, {workers} workers of {memory}: {took:.0f} s"
+    )
+    print(f"  CPU seconds {seconds:.0f}, of these in tiles {told['cpu_seconds']:.0f}; area {told['total_area']:.9g}")
+    print("  most memory of the program, and of each worker:", [f"{size / 2**30:.2f} GB" for size in used.values()])
+    beside_whole(count, seconds)
+
+
+def memory_used(pid):
+    """Return the resident memory of a process and of the workers that it has started, in bytes."""
+    found = {}
+    try:
+        process = psutil.Process(pid)
+        for one in [process, *process.children(recursive=True)]:
+            if one.pid == pid or "spawn_main" in " ".join(one.cmdline()):
+                found[one.pid] = one.memory_info().rss
+    except psutil.NoSuchProcess:
+        pass  # it has ended meanwhile
+    return found
+
+
+def beside_whole(count, seconds):
+    """Print CPU time a point, and that of a whole cloud."""
     points = torus_points(WHOLE)
     began = time.process_time()
     core.mean_curvature(core.build_laplacian(points))
     whole = time.process_time() - began
     print(
         f"  CPU microseconds a point: tiles {1e6 * seconds / count:.0f}, whole of {WHOLE:,} {1e6 * whole / WHOLE:.0f},"
-        f" ratio {seconds / count * WHOLE / whole:.2f} (target 1.6)"
+        f" ratio {seconds / count * WHOLE / whole:.2f} (target 1.6)",
+        flush=True,
     )
 
 
 if __name__ == "__main__":
-    {"store": store, "torus": torus, "zoo": zoo}[sys.argv[1]](*sys.argv[2:])
+    {"run": run, "store": store, "torus": torus, "zoo": zoo}[sys.argv[1]](*sys.argv[2:])
