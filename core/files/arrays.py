@@ -2,12 +2,15 @@
 
 import re
 import zipfile
+from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 
 from ..errors import InvalidPointsError
+from ..types import Array
 from .lines import brief
 from .rows import unpacks_too_far
 from .table import PointTable
@@ -27,35 +30,62 @@ def read_array(path: Path) -> PointTable:
     InvalidPointsError
         There is none.
     """
-    with open(path, "rb") as file:
+    return next((table for table, _ in array_pieces(path)), PointTable(np.empty((0, 3))))
+
+
+def array_pieces(
+    path: Path, size: int | None = None, notices: list[str] | None = None
+) -> Iterator[tuple[PointTable, dict[str, Array]]]:
+    """Yield the points of such a file, so many at once, with no further columns; errors as of `read_array`."""
+    with ExitStack() as stack:
+        file = stack.enter_context(open(path, "rb"))
         packed = file.read(2) == b"PK"
-        size = file.seek(0, 2)
-        file.seek(0)
-        if not packed:
-            return _read_rows(file, path, size)
-        with zipfile.ZipFile(file) as archive:
-            name = next((name for name in ("points.npy", "points") if name in archive.namelist()), None)
-            if name is None:
-                raise InvalidPointsError(
-                    f"{path} holds no array of points: points is not among its arrays. Save it again with that name."
-                )
-            entry = archive.getinfo(name)
-            if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-                raise InvalidPointsError(
-                    f"{path} uses a compression that numpy does not support. Save it again with numpy.savez."
-                )
-            unpacked = entry.file_size
-            if unpacks_too_far(unpacked, size):
-                raise InvalidPointsError(
-                    f"{path} would unpack to {unpacked / 1e6:,.0f} MB from {size / 1e6:,.1f} MB, which points never do."
-                    " Save it again with numpy.savez, without compression."
-                )
-            with archive.open(name) as member:
-                return _read_rows(member, path, unpacked)
+        if packed:
+            archive = stack.enter_context(zipfile.ZipFile(file))
+            entry = _entry(archive, path, file.seek(0, 2))
+            there = entry.file_size
+        else:
+            there = file.seek(0, 2)
+
+        def opened() -> IO[bytes]:
+            return stack.enter_context(archive.open(entry.filename) if packed else open(path, "rb"))
+
+        dtype, columnwise, count, begin = _read_header(opened(), path, there)
+        step = count if size is None else size
+        # An array that is stored column by column is read at three places.
+        streams = [opened() for _ in range(3 if columnwise else 1)]
+        for axis, stream in enumerate(streams):
+            stream.seek(begin + axis * count * dtype.itemsize)
+        width = 3 // len(streams)
+        for done in range(0, count, step):
+            rows = min(step, count - done)
+            parts = [np.frombuffer(stream.read(rows * width * dtype.itemsize), dtype) for stream in streams]
+            values = np.concatenate([part.reshape(rows, width) for part in parts], axis=1, dtype=np.float64)
+            yield PointTable(values, single=dtype == np.float32), {}
 
 
-def _read_rows(file: IO[bytes], path: Path, size: int) -> PointTable:
-    """Read an array (n, 3) of a file, or a member of an archive, of so many bytes, and allocate no more memory.
+def _entry(archive: zipfile.ZipFile, path: Path, size: int) -> zipfile.ZipInfo:
+    """Return the entry of the points in an archive of so many bytes."""
+    name = next((name for name in ("points.npy", "points") if name in archive.namelist()), None)
+    if name is None:
+        raise InvalidPointsError(
+            f"{path} holds no array of points: points is not among its arrays. Save it again with that name."
+        )
+    entry = archive.getinfo(name)
+    if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        raise InvalidPointsError(
+            f"{path} uses a compression that numpy does not support. Save it again with numpy.savez."
+        )
+    if unpacks_too_far(entry.file_size, size):
+        raise InvalidPointsError(
+            f"{path} would unpack to {entry.file_size / 1e6:,.0f} MB from {size / 1e6:,.1f} MB, which points never do."
+            " Save it again with numpy.savez, without compression."
+        )
+    return entry
+
+
+def _read_header(file: IO[bytes], path: Path, size: int) -> tuple[np.dtype[Any], bool, int, int]:
+    """Return type, whether it is stored column by column, rows, and where they begin, of an array of so many bytes.
 
     The header is not parsed by numpy, which evaluates it as Python.
     """
@@ -84,6 +114,4 @@ def _read_rows(file: IO[bytes], path: Path, size: int) -> PointTable:
             f"{path} holds no array of points: it ends after {there // (3 * dtype.itemsize)} of {count} points."
             " Copy or save it again."
         )
-    values = np.frombuffer(file.read(3 * count * dtype.itemsize), dtype)
-    values = values.reshape((count, 3), order="F" if columnwise == "True" else "C")
-    return PointTable(values.astype(np.float64), single=dtype == np.float32)
+    return dtype, columnwise == "True", count, file.tell()

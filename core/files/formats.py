@@ -80,14 +80,19 @@ def read_points(path: Path, columns: str = "", las: LasChoices = LasChoices()) -
     if suffix not in _READERS:
         known = ", ".join((*READABLE, *SPLATS))
         raise PointCloudError(f"{path} is not a file with points. Give one of {known}.")
-    if columns.strip() and suffix not in TEXTS:
-        raise PointCloudError(f"{path} names its columns itself. Give Columns only with {', '.join(TEXTS)}.")
+    check_columns(path, columns)
     with reading(path):
         given = {"columns": columns} if columns.strip() else {"las": las} if suffix in SCANS else {}
         table = without_missed(_READERS[suffix](path, **given), path)
     check_places(table.points, path)
     table.notices += doubts(table, path)
     return table
+
+
+def check_columns(path: Path, columns: str) -> None:
+    """Refuse names of columns for a file that is not of one of the kinds in `TEXTS`."""
+    if columns.strip() and path.suffix.lower() not in TEXTS:
+        raise PointCloudError(f"{path} names its columns itself. Give Columns only with {', '.join(TEXTS)}.")
 
 
 def doubts(table: PointTable, path: Path) -> Iterator[str]:

@@ -1,7 +1,5 @@
 """Kinds of columns without names, by their values: colors, normals, or unknown."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from ..types import Array, Floats
@@ -16,89 +14,131 @@ _LENGTH = 0.02  # by which lengths of normals, rounded to a few digits, may diff
 _STEP = 1e-4  # by which shares of 255 may differ from whole ones, in a file of a few digits
 
 
-def guess_names(values: Array, unknown: list[str], scanned: bool = True) -> list[str]:
-    """Name columns that a file does not name.
+class Guess:
+    """Kinds of columns that a file does not name, gathered from their values, as many rows at once as one likes.
 
     Parameters
     ----------
-    values : ndarray, (n, k)
-    unknown : list of str
-        A name for each, for those that are neither.
-    scanned : bool
-        Whether a single number before colors may be an intensity: not one before the coordinates, which counts points.
-
-    Returns
-    -------
-    list of str
-        r g b, alpha, nx ny nz, intensity, or the given ones.
+    width : int
+        How many columns.
     """
-    names = list(unknown)
-    values = values[np.isfinite(values).all(axis=1)]
-    color, normal = _best_pair(_triples(values, _are_colors), _triples(values, _are_normals), values)
-    if normal is not None:
-        names[normal : normal + 3] = _NORMALS
-    if color is not None:
-        names[color : color + 3] = _COLORS
-        alpha = color + 3
-        full = _FULL if values[:, color:alpha].max() > 1.0 else 1.0
-        if alpha < len(names) and alpha != normal and (values[:, alpha] == full).all():
-            names[alpha] = "alpha"
-        if scanned and color == 1 and len(names) == len(_SCANNED):
-            names = list(_SCANNED)
-    return names
+
+    def __init__(self, width: int) -> None:
+        self._triples = [_Triple() for _ in range(min(width, _MOST) - 2)]
+        self._all_full, self._all_one = np.ones((2, width), dtype=bool)
+
+    def add(self, values: Array) -> None:
+        """Look at further rows, (n, k)."""
+        values = values[np.isfinite(values).all(axis=1)]
+        if not len(values):
+            return
+        self._all_full &= (values == _FULL).all(axis=0)
+        self._all_one &= (values == 1.0).all(axis=0)
+        for first, triple in enumerate(self._triples):
+            triple.add(values[:, first : first + 3])
+
+    def names(self, unknown: list[str], scanned: bool = True) -> list[str]:
+        """Name the columns.
+
+        Parameters
+        ----------
+        unknown : list of str
+            A name for each, for those that are neither.
+        scanned : bool
+            Whether a single number before colors may be an intensity: not one before the coordinates, which counts
+            points.
+
+        Returns
+        -------
+        list of str
+            r g b, alpha, nx ny nz, intensity, or the given ones.
+        """
+        names = list(unknown)
+        color, normal = self._best_pair()
+        if normal is not None:
+            names[normal : normal + 3] = _NORMALS
+        if color is not None:
+            names[color : color + 3] = _COLORS
+            alpha = color + 3
+            full = self._all_full if self._triples[color].largest > 1.0 else self._all_one
+            if alpha < len(names) and alpha != normal and full[alpha]:
+                names[alpha] = "alpha"
+            if scanned and color == 1 and len(names) == len(_SCANNED):
+                names = list(_SCANNED)
+        return names
+
+    def _best_pair(self) -> tuple[int | None, int | None]:
+        """Choose columns of colors and of normals that explain most; of colors those whose channels differ least.
+
+        Opacities, intensities and labels beside them differ more.
+        """
+        colors = [None, *(first for first, triple in enumerate(self._triples) if triple.are_colors)]
+        normals = [None, *(first for first, triple in enumerate(self._triples) if triple.are_normals)]
+        pairs = [
+            (color, normal)
+            for color in colors
+            for normal in normals
+            if color is None or normal is None or abs(color - normal) >= 3
+        ]
+
+        def quality(pair: tuple[int | None, int | None]) -> tuple[int, float, bool]:
+            color, normal = pair
+            explained = (color is not None) + (normal is not None)
+            return explained, -self._spread(color), color is not None
+
+        return max(pairs, key=quality)
+
+    def _spread(self, first: int | None) -> float:
+        """Return how much the channels of colors differ."""
+        if first is None:
+            return 0.0
+        triple = self._triples[first]
+        alpha = 2.0 * _FULL if self._all_full[first : first + 3].any() else 0.0  # the same everywhere
+        return triple.spread / triple.count + alpha
 
 
-def _triples(values: Array, fits: Callable[[Array], bool]) -> list[int | None]:
-    """Return the first of three columns that fit, each, and None for no such columns."""
-    sample = values[:: max(len(values) // _SAMPLE, 1)]
-    firsts = range(min(values.shape[1], _MOST) - 2) if len(values) else ()
-    return [
-        None,
-        *(first for first in firsts if fits(sample[:, first : first + 3]) and fits(values[:, first : first + 3])),
-    ]
+class _Triple:
+    """What the values of three columns are.
 
-
-def _best_pair(colors: list[int | None], normals: list[int | None], values: Array) -> tuple[int | None, int | None]:
-    """Choose columns of colors and of normals that explain most; of colors those whose channels differ least.
-
-    Opacities, intensities and labels beside them differ more.
+    Attributes
+    ----------
+    count : int
+        Rows, of which those that were looked at in full are counted.
+    largest : float
+    spread : float
+        By how much the three differ, summed over the rows.
     """
-    pairs = [
-        (color, normal)
-        for color in colors
-        for normal in normals
-        if color is None or normal is None or abs(color - normal) >= 3
-    ]
 
-    def quality(pair: tuple[int | None, int | None]) -> tuple[int, float, bool]:
-        color, normal = pair
-        explained = (color is not None) + (normal is not None)
-        return explained, -_spread(values, color), color is not None
+    def __init__(self) -> None:
+        self.count, self.largest, self.spread = 0, 0.0, 0.0
+        self._within = self._whole = self._shares = self._unit = True  # holds for all values
+        self._there, self._mixed = 0, False
 
-    return max(pairs, key=quality)
+    @property
+    def are_normals(self) -> bool:
+        """Whether they are vectors of length 1, but for some that are zero or missing."""
+        return self._unit and 2 * self._there > self.count
 
+    @property
+    def are_colors(self) -> bool:
+        """Whether they are whole numbers from 0 to 255, or their shares, and not all 0 or 1."""
+        if not self.count or not self._within or self.are_normals:
+            return False
+        return self._whole if self.largest > 1.0 else self._shares and self._mixed
 
-def _spread(values: Floats, first: int | None) -> float:
-    """Return how much the channels of colors differ."""
-    if first is None:
-        return 0.0
-    channels = values[:, first : first + 3]
-    alpha = 2.0 * _FULL if (channels == _FULL).all(axis=0).any() else 0.0  # the same everywhere
-    return float(np.ptp(channels, axis=1).mean()) + alpha
-
-
-def _are_colors(values: Floats) -> bool:
-    """Whether three columns are whole numbers from 0 to 255, or their shares, and not all 0 or 1."""
-    if not ((values >= 0.0) & (values <= _FULL)).all() or _are_normals(values):
-        return False
-    if values.max() > 1.0:
-        return bool((values == np.round(values)).all())
-    shares = _FULL * values
-    return bool((np.abs(shares - np.round(shares)) < _FULL * _STEP).all() and (shares % _FULL != 0.0).any())
-
-
-def _are_normals(values: Floats) -> bool:
-    """Whether three columns are vectors of length 1, but for some that are zero or missing."""
-    lengths = np.linalg.norm(values, axis=1)
-    there = lengths > 0.0
-    return bool(2 * there.sum() > len(values) and (np.abs(lengths[there] - 1.0) < _LENGTH).all())
+    def add(self, values: Floats) -> None:
+        """Look at further rows, (n, 3), unless it is clear already that they are neither."""
+        for part in (values[:: max(len(values) // _SAMPLE, 1)], values):
+            if not (self._unit or (self._within and (self._whole or self._shares))):
+                return
+            shares, lengths = _FULL * part, np.linalg.norm(part, axis=1)
+            there = lengths > 0.0
+            self._within = self._within and bool(((part >= 0.0) & (part <= _FULL)).all())
+            self._whole = self._whole and bool((part == np.round(part)).all())
+            self._shares = self._shares and bool((np.abs(shares - np.round(shares)) < _FULL * _STEP).all())
+            self._unit = self._unit and bool((np.abs(lengths[there] - 1.0) < _LENGTH).all())
+        self.count += len(values)
+        self.largest = max(self.largest, float(values.max()))
+        self.spread += float(np.ptp(values, axis=1).sum())
+        self._there += int(np.count_nonzero(there))
+        self._mixed = self._mixed or bool((shares % _FULL != 0.0).any())

@@ -2,10 +2,9 @@
 
 import re
 import unicodedata
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
-from ..types import Array
 from .ascii_words import LETTERS
 
 
@@ -190,7 +189,7 @@ def _pairs(words: dict[int, str]) -> Iterator[tuple[_System, int, int]]:
             yield system, x, y
 
 
-def standard_names(names: dict[str, Array]) -> dict[str, str]:
+def standard_names(names: Iterable[str]) -> dict[str, str]:
     """Return new names for columns of colors and normals with other names, such as colorRed or NormalX."""
     found: dict[str, str] = {}
     for name in names:

@@ -1,6 +1,6 @@
 """Points of files piece by piece, for clouds larger than the memory."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -9,14 +9,24 @@ from numpy.typing import ArrayLike
 
 from ..errors import InvalidPointsError
 from ..types import Array, Floats
+from .arrays import array_pieces
 from .copc import Box
 from .e57 import e57_scans
-from .formats import SCANS, doubts, read_points, reading
+from .formats import SCANS, TEXTS, check_columns, doubts, read_points, reading
 from .las import Tally, las_pieces, opened_las, settle_columns
 from .las_choices import LasChoices
 from .ply import ply_pieces
 from .table import CHANNELS, FARTHEST, PointTable, check_places, full_color
+from .text import column_pieces, scan_pieces, vertex_pieces
 
+_PIECES: dict[str, Callable[..., Iterator[tuple[PointTable, dict[str, Array]]] | None]] = {  # None: only as a whole
+    **dict.fromkeys(TEXTS, column_pieces),
+    ".pts": scan_pieces,
+    ".obj": vertex_pieces,
+    ".ply": ply_pieces,
+    ".npy": array_pieces,
+    ".npz": array_pieces,
+}
 _NOWHERE = np.full((2, 3), np.nan)
 
 
@@ -50,10 +60,13 @@ class Chunks:
         As of `PointTable`; known at the end.
     """
 
-    def __init__(self, path: Path, size: int, box: Box | None, level: int | None, las: LasChoices) -> None:
+    def __init__(
+        self, path: Path, size: int, box: Box | None, level: int | None, las: LasChoices, columns: str
+    ) -> None:
         self.notices: list[str] = []
         self.single = self.degrees = False
-        self._path, self._size, self._box, self._level, self._las = path, size, box, level, las
+        self._path, self._size, self._box, self._level = path, size, box, level
+        self._las, self._columns = las, columns
         self._pieces = self._guarded()
 
     def __iter__(self) -> Iterator[tuple[Floats, dict[str, Array]]]:
@@ -86,7 +99,8 @@ class Chunks:
         if suffix in SCANS:
             yield from self._read_las()
             return
-        found = ply_pieces(self._path, self._size, self.notices) if suffix == ".ply" else None
+        given = {"columns": self._columns} if self._columns else {}
+        found = _PIECES[suffix](self._path, self._size, self.notices, **given) if suffix in _PIECES else None
         for table, channels in found or self._read_whole(suffix):
             self.single, self.degrees = self.single or table.single, self.degrees or table.degrees
             yield table.points, {**channels, **table.attributes}
@@ -117,11 +131,13 @@ def chunks(
     bounds: ArrayLike | None = None,
     level: int | None = None,
     las: LasChoices = LasChoices(),
+    columns: str = "",
 ) -> Chunks:
     """Read the points of a file of one of the kinds in `READABLE` in pieces.
 
-    Memory is that of a piece for LAS, LAZ, COPC and binary PLY files without lists. Other files are read as a whole,
-    E57 files scan by scan, and cut in pieces then.
+    Memory is that of a piece for LAS, LAZ, COPC, binary PLY files without lists, OBJ, arrays of numpy, and columns of
+    text, which are read once more before, for what they hold. PCD, PTX and other PLY files are read as a whole, E57
+    files scan by scan, and cut in pieces then.
 
     Parameters
     ----------
@@ -135,6 +151,8 @@ def chunks(
         The last level of detail of a COPC file that is read, from 0, which is the coarsest.
     las : LasChoices
         Which points of LAS files are read.
+    columns : str
+        Names of the columns of text, as of `read_points`.
 
     Returns
     -------
@@ -147,8 +165,8 @@ def chunks(
     Raises
     ------
     PointCloudError
-        A level of a file without such; and, while it is iterated, as `read_points` does, but for LAS, E57 and binary
-        PLY files without points, which give no piece.
+        A level of a file without such; and, while it is iterated, as `read_points` does, but for files without
+        points that are not read as a whole, which give no piece.
 
     Examples
     --------
@@ -172,7 +190,8 @@ def chunks(
         raise InvalidPointsError(f"The level is {level}. Levels begin with 0, the coarsest.")
     if level is not None and not has_levels(path):
         raise InvalidPointsError(f"{path} has no levels of detail, which only COPC files have. Read it without.")
-    return Chunks(path, size, None if box is None else (box[0], box[1]), level, las)
+    check_columns(path, columns)
+    return Chunks(path, size, None if box is None else (box[0], box[1]), level, las, columns.strip())
 
 
 def has_levels(path: Path) -> bool:

@@ -1,29 +1,32 @@
 """Columns of numbers as text: XYZ, CSV, PTS, and the vertices of OBJ files."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import chain, islice
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 
 from ..errors import InvalidPointsError
-from ..types import Array, Floats
-from .cells import Blocks, Rows, find_rows, load, load_whole
+from ..types import Array
+from .cells import Blocks, Rows, find_rows
 from .digits import shortest
-from .guess import guess_names
-from .layout import find_layout, given_layout
+from .guess import Guess
+from .layout import Layout, find_layout, given_layout
 from .lines import is_number, read_text
+from .loading import load
 from .names import standard_names
 from .ptx import holds_ptx, read_ptx
-from .table import PointTable, from_columns, to_columns
+from .table import PointTable, color_by, gather_columns, to_columns
+
+Pieces: TypeAlias = Iterator[tuple[PointTable, dict[str, Array]]]
 
 _BLOCK = 10_000  # lines that are written at once
 _SAMPLE = 100  # vertices by which their columns are decided
 _MOST_DIGITS = 15  # of a number of points; no file has so many
 _SKIPPED = ("#", "//")  # prefixes of lines that may be of any length
-_EXACT = 2.0**53  # from here on doubles skip whole numbers
 _SCAN_NAMES = {  # of the columns of PTS files
     4: ("x", "y", "z", "intensity"),
     6: ("x", "y", "z", "r", "g", "b"),
@@ -45,53 +48,98 @@ def read_columns(path: Path, columns: str = "") -> PointTable:
     columns : str
         Names of the columns in their order; see `given_layout`. Empty to find them.
     """
-    return _read_text(partial(read_text, path, _SKIPPED), path, columns)
+    return _whole(column_pieces, path, columns)
 
 
 def read_scan(path: Path, columns: str = "") -> PointTable:
     """Read a PTS file: scans one after another, each begins with the number of its points; columns as above."""
-    return _read_text(lambda: _without_counts(read_text(path, _SKIPPED), path), path, columns, _SCAN_NAMES)
+    return _whole(scan_pieces, path, columns)
 
 
-def _read_text(blocks: Blocks, path: Path, columns: str, usual: dict[int, tuple[str, ...]] | None = None) -> PointTable:
-    """Read rows of numbers, in which columns without names have the usual ones for their number."""
-    columns = columns.strip()
-    if not columns and holds_ptx(read_text(path, _SKIPPED)):
-        return read_ptx(path)
-    rows = find_rows(blocks, path)
-    layout = given_layout(columns, rows) if columns else find_layout(rows, usual or {})
-    others, values, notices = load(rows, layout.places, layout.others, layout.label)
-    extra = {}
-    for index, column in zip(others, values.T[3:], strict=True):
-        extra[layout.label(index)], lost = _exact(rows, index, column)
-        if lost:
-            notices.append(f"{path.name}: {layout.label(index)} has whole numbers whose last digits are rounded.")
-    nameless = [layout.label(index) for index in others if not layout.names[index]]
-    if nameless:
-        behind = min(others) > max(layout.places)
-        guessed = guess_names(np.stack([extra[name] for name in nameless], axis=1), nameless, behind)
-        extra = _renamed(extra, dict(zip(nameless, guessed, strict=True)))
-        notices.append(_guess_notice(path, layout.places, nameless, guessed))
-    table = from_columns(dict(zip("xyz", values.T, strict=False)) | _renamed(extra, standard_names(extra)), path)
-    table.degrees = layout.degrees
-    table.notices += [*layout.notices, *notices]
-    if layout.announced not in (None, len(values)):
-        table.notices.append(f"{path.name}: announces {layout.announced} points, but {len(values)} lines follow.")
+def _whole(pieces: Callable[..., Pieces | None], path: Path, columns: str) -> PointTable:
+    """Return the one piece that a whole file is."""
+    notices: list[str] = []
+    found = pieces(path, None, notices, columns)
+    return read_ptx(path) if found is None else _colored(found, path, notices)
+
+
+def _colored(pieces: Pieces, path: Path, notices: list[str]) -> PointTable:
+    [(table, channels)] = pieces
+    color_by(table, channels, path)
+    table.notices += notices
     return table
 
 
-def _exact(rows: Rows, index: int, values: Floats) -> tuple[Array, bool]:
-    """Return values as whole numbers if doubles would lose their digits, and whether some are lost nevertheless."""
-    if not (np.abs(values) >= _EXACT).any():
-        return values, False
-    whole, lost = load_whole(rows, index)
-    return (values if whole is None else whole), lost
+def column_pieces(path: Path, size: int | None, notices: list[str], columns: str = "") -> Pieces | None:
+    """Yield the points of a text file, so many at once, as `gather_columns` makes them.
+
+    What the columns are is decided by all rows, which are read for that first.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+    size : int or None
+        None for all at once.
+    notices : list of str
+        Gets what is guessed and left out.
+    columns : str
+        As of `read_columns`.
+
+    Returns
+    -------
+    iterator of (PointTable, dict of str to ndarray), or None
+        None where the file is a PTX file, which has pieces of its own.
+    """
+    return _pieces(partial(read_text, path, _SKIPPED), path, size, notices, columns, {})
 
 
-def _renamed(columns: dict[str, Array], names: dict[str, str]) -> dict[str, Array]:
-    """Return columns by new names, but for those that others have, such as the coordinates."""
+def scan_pieces(path: Path, size: int | None, notices: list[str], columns: str = "") -> Pieces | None:
+    """Yield the points of a PTS file in the same way."""
+
+    def blocks() -> Iterator[list[str]]:
+        return _without_counts(read_text(path, _SKIPPED), path)
+
+    return _pieces(blocks, path, size, notices, columns, _SCAN_NAMES)
+
+
+def _pieces(
+    blocks: Blocks, path: Path, size: int | None, notices: list[str], columns: str, usual: dict[int, tuple[str, ...]]
+) -> Pieces | None:
+    """Yield rows of numbers, in which columns without names have the usual ones for their number."""
+    columns = columns.strip()
+    if not columns and holds_ptx(read_text(path, _SKIPPED)):
+        return None
+    rows = find_rows(blocks, path)
+    layout = given_layout(columns, rows) if columns else find_layout(rows, usual)
+    return _by_layout(rows, layout, size, notices)
+
+
+def _by_layout(rows: Rows, layout: Layout, size: int | None, notices: list[str]) -> Pieces:
+    loaded = load(rows, layout.places, layout.others, layout.label, size)
+    notices += [*layout.notices, *loaded.notices]
+    indices = {layout.label(index): index for index in loaded.others}
+    nameless = {label: index for label, index in indices.items() if not layout.names[index]}
+    if nameless:
+        guess = Guess(len(nameless))
+        for _, others in loaded.pieces():
+            guess.add(np.stack([others[index] for index in nameless.values()], axis=1))
+        guessed = guess.names([*nameless], min(loaded.others) > max(layout.places))
+        indices = _renamed(indices, dict(zip(nameless, guessed, strict=True)))
+        notices.append(_guess_notice(rows.path, layout.places, [*nameless], guessed))
+    indices = _renamed(indices, standard_names(indices))
+    if layout.announced not in (None, loaded.count):
+        notices.append(f"{rows.path.name}: announces {layout.announced} points, but {loaded.count} lines follow.")
+    for places, others in loaded.pieces():
+        named = {name: others[index] for name, index in indices.items()}
+        table, channels = gather_columns(dict(zip("xyz", places.T, strict=True)) | named, rows.path)
+        table.degrees = layout.degrees
+        yield table, channels
+
+
+def _renamed(columns: dict[str, int], names: dict[str, str]) -> dict[str, int]:
+    """Return indices of columns by new names, but for those that others have, such as the coordinates."""
     taken = {*"xyz", *columns} - {*names}
-    return {_free(names.get(name, name), name, taken): values for name, values in columns.items()}
+    return {_free(names.get(name, name), name, taken): index for name, index in columns.items()}
 
 
 def _free(new: str, old: str, taken: set[str]) -> str:
@@ -155,6 +203,12 @@ def _holds_numbers(line: str) -> bool:
 
 def read_vertices(path: Path) -> PointTable:
     """Read the vertices of an OBJ file, with colors if they have any."""
+    notices: list[str] = []
+    return _colored(vertex_pieces(path, None, notices), path, notices)
+
+
+def vertex_pieces(path: Path, size: int | None, notices: list[str]) -> Pieces:
+    """Yield the vertices of an OBJ file, so many at once, as `column_pieces` does."""
     faces = 0
 
     def blocks() -> Iterator[list[str]]:
@@ -172,13 +226,13 @@ def read_vertices(path: Path) -> PointTable:
         raise InvalidPointsError(f"{path} has no vertices, which are lines that begin with v. It holds no points.")
     names = _vertex_names(rows)
     colors = [index for index, name in enumerate(names) if index > 2 and name != "w"]
-    others, values, notices = load(rows, [0, 1, 2], colors, names.__getitem__)
-    columns = dict(zip("xyz", values.T, strict=False)) | {names[i]: values[:, 3 + n] for n, i in enumerate(others)}
-    table = from_columns(columns, path)
-    table.notices += notices
+    loaded = load(rows, [0, 1, 2], colors, names.__getitem__, size)
+    notices += loaded.notices
     if faces:
-        table.notices.append(f"{path.name}: left out {faces} faces and lines. Only points are read.")
-    return table
+        notices.append(f"{path.name}: left out {faces} faces and lines. Only points are read.")
+    for places, others in loaded.pieces():
+        columns = dict(zip("xyz", places.T, strict=True)) | {names[index]: values for index, values in others.items()}
+        yield gather_columns(columns, path)
 
 
 def _vertex_names(rows: Rows) -> list[str]:
