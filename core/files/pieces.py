@@ -16,7 +16,7 @@ from .formats import SCANS, TEXTS, check_columns, doubts, read_points, reading
 from .las import Tally, las_pieces, opened_las, settle_columns
 from .las_choices import LasChoices
 from .ply import ply_pieces
-from .table import CHANNELS, FARTHEST, PointTable, check_places, full_color
+from .table import CHANNELS, Missed, PointTable, check_places, full_color
 from .text import column_pieces, scan_pieces, vertex_pieces
 
 _PIECES: dict[str, Callable[..., Iterator[tuple[PointTable, dict[str, Array]]] | None]] = {  # None: only as a whole
@@ -74,15 +74,14 @@ class Chunks:
 
     def _guarded(self) -> Iterator[tuple[Floats, dict[str, Array]]]:
         """Yield pieces of points with coordinates; errors of a broken file become typed ones."""
-        pieces, missed = self._read(), 0
+        pieces, missed = self._read(), Missed()
         while True:
             with reading(self._path):  # not around the yield: the caller's errors are no faults of the file
                 piece = next(pieces, None)
             if piece is None:
                 break
             points, attributes = piece
-            kept = np.all(np.abs(points) <= FARTHEST, axis=1)
-            missed += len(kept) - int(np.count_nonzero(kept))
+            kept = missed.add(points)
             if self._box is not None:
                 kept = kept & np.all((points >= self._box[0]) & (points <= self._box[1]), axis=1)
             if not kept.all():
@@ -90,8 +89,7 @@ class Chunks:
             for start in range(0, len(points), self._size):
                 rows = slice(start, start + self._size)
                 yield points[rows], {name: values[rows] for name, values in attributes.items()}
-        if missed:
-            self.notices.append(f"{self._path.name}: left out {missed} points without valid coordinates.")
+        self.notices += missed.notices(self._path)
 
     def _read(self) -> Iterator[tuple[Floats, dict[str, Array]]]:
         """Yield pieces as the format gives them."""

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InvalidPointsError, TooFewPointsError
-from ..types import Array, Floats
+from ..types import Array, Bools, Floats
 from .lines import brief
 
 NORMAL = "normal"  # the attribute that files call nx ny nz
@@ -196,22 +196,55 @@ def without_missed(table: PointTable, path: Path) -> PointTable:
     path : pathlib.Path
         The file, for the texts.
     """
-    kept = np.all(np.abs(table.points) <= FARTHEST, axis=1)
-    missed = len(kept) - np.count_nonzero(kept)
-    far = np.isfinite(table.points).all(axis=1) & ~kept
-    if not missed or far.all():
+    missed = Missed()
+    kept = missed.add(table.points)
+    if not missed.count or missed.far == len(kept):
         return table
-    values = "NaN or infinity" if np.isinf(table.points).any() else "NaN"
-    values = f"{values}, or beyond {FARTHEST:g}" if far.any() else values
-    if missed == len(kept):
+    if missed.count == len(kept):
         raise TooFewPointsError(
-            f"{path} has no points: all {missed} have no valid coordinates ({values}). Export it again."
+            f"{path} has no points: all {missed.count} have no valid coordinates ({missed.values}). Export it again."
         )
     table.points = table.points[kept]
     table.attributes = {name: values[kept] for name, values in table.attributes.items()}
     table.colors = None if table.colors is None else table.colors[kept]
-    table.notices.append(f"{path.name}: left out {missed} points that the sensor missed ({values}).")
+    table.notices += missed.notices(path)
     return table
+
+
+class Missed:
+    """Counts points without valid coordinates.
+
+    Attributes
+    ----------
+    count : int
+        Those looked at.
+    far : int
+        Those of them with finite ones.
+    """
+
+    def __init__(self) -> None:
+        self.count = self.far = 0
+        self._infinite = False
+
+    def add(self, points: Floats) -> Bools:
+        """Look at points, (k, 3), and return which of them have valid coordinates."""
+        kept: Bools = np.all(np.abs(points) <= FARTHEST, axis=1)
+        wrong = points[~kept]
+        self.count += len(wrong)
+        self.far += int(np.count_nonzero(np.isfinite(wrong).all(axis=1)))
+        self._infinite = self._infinite or bool(np.isinf(wrong).any())
+        return kept
+
+    @property
+    def values(self) -> str:
+        """What they have instead."""
+        values = "NaN or infinity" if self._infinite else "NaN"
+        return f"{values}, or beyond {FARTHEST:g}" if self.far else values
+
+    def notices(self, path: Path) -> Iterator[str]:
+        """Report that they were left out."""
+        if self.count:
+            yield f"{path.name}: left out {self.count} points that the sensor missed ({self.values})."
 
 
 def check_places(points: Floats, path: Path) -> float:

@@ -142,7 +142,7 @@ def test_points_that_the_sensor_missed_are_left_out(tmp_path):
     (tmp_path / "a.ply").write_bytes(data)
     found = chunks(tmp_path / "a.ply", 300)
     assert [len(piece) for piece, _ in found] == [300, 300, 99]
-    assert "left out 1 points without valid coordinates" in found.notices[-1]
+    assert "left out 1 points that the sensor missed (NaN)" in found.notices[-1]
 
 
 def test_classes_of_las_files(tmp_path):
