@@ -128,17 +128,23 @@ class _Triple:
 
     def add(self, values: Floats) -> None:
         """Look at further rows, (n, 3), unless it is clear already that they are neither."""
+        there, mixed = 0, False
         for part in (values[:: max(len(values) // _SAMPLE, 1)], values):
-            if not (self._unit or (self._within and (self._whole or self._shares))):
-                return
-            shares, lengths = _FULL * part, np.linalg.norm(part, axis=1)
-            there = lengths > 0.0
+            if self._unit:
+                lengths = np.linalg.norm(part, axis=1)
+                long = lengths > 0.0
+                there = int(np.count_nonzero(long))
+                self._unit = bool((np.abs(lengths[long] - 1.0) < _LENGTH).all())
             self._within = self._within and bool(((part >= 0.0) & (part <= _FULL)).all())
-            self._whole = self._whole and bool((part == np.round(part)).all())
-            self._shares = self._shares and bool((np.abs(shares - np.round(shares)) < _FULL * _STEP).all())
-            self._unit = self._unit and bool((np.abs(lengths[there] - 1.0) < _LENGTH).all())
+            self._whole = self._within and self._whole and bool((part == np.round(part)).all())
+            if self._within and self._shares:
+                shares = _FULL * part
+                mixed = bool((shares % _FULL != 0.0).any())
+                self._shares = bool((np.abs(shares - np.round(shares)) < _FULL * _STEP).all())
+            if not (self._unit or self._whole or (self._within and self._shares)):
+                return
         self.count += len(values)
         self.largest = max(self.largest, float(values.max()))
         self.spread += float(np.ptp(values, axis=1).sum())
-        self._there += int(np.count_nonzero(there))
-        self._mixed = self._mixed or bool((shares % _FULL != 0.0).any())
+        self._there += there
+        self._mixed = self._mixed or mixed
