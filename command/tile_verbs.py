@@ -61,8 +61,6 @@ class _Cutting(_TileVerb):
             parser.error("--part would leave points out: all inputs are one cloud")
         if arguments.tile_points is not None and arguments.tile_points < 1:
             parser.error("--tile-points must be at least 1")
-        if chosen(_SETTINGS, arguments)["bandwidth"] == "GLOBAL":
-            parser.error("--bandwidth global is one length for the whole cloud, which tiles do not know: use adaptive")
         arguments.sources, arguments.inputs = arguments.inputs, [arguments.folder]
 
     def cut(self, arguments, count):

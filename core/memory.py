@@ -14,7 +14,7 @@ from .options import LaplacianOptions
 _PER_NEIGHBOR = 42
 _ALONE = 43  # neighbours that would take as much as what each point needs for itself
 _PER_MODE = 70  # bytes a point for each mode beyond that: 50 and 400 modes took 3.4 and 28 kB a point
-_ADAPTIVE = 60  # neighbours in "adaptive" kernels on random points, which have the most
+ADAPTIVE = 60.0  # neighbours in "adaptive" kernels on random points, which have the most
 _SHARE = 0.8  # of the free memory, to leave some for other programs
 _CGROUP = Path("/sys/fs/cgroup")
 
@@ -36,9 +36,13 @@ def needed_memory(count: int, options: LaplacianOptions, modes: int = 0) -> int:
     int
         Bytes. Those of random points, which have the widest kernels; even samples take half.
     """
-    inside = _ADAPTIVE if options.bandwidth == "adaptive" else 9.0 * options.neighbors  # of 3 h
-    neighbors = inside * options.bandwidth_factor**2
-    return int(count * (_PER_NEIGHBOR * (neighbors + _ALONE) + _PER_MODE * modes))
+    return int(count * (_PER_NEIGHBOR * (points_in_kernel(options) + _ALONE) + _PER_MODE * modes))
+
+
+def points_in_kernel(options: LaplacianOptions) -> float:
+    """Estimate how many points a kernel holds, on random points, where "adaptive" ones hold most."""
+    inside = ADAPTIVE if options.bandwidth == "adaptive" else 9.0 * options.neighbors  # of 3 h
+    return inside * options.bandwidth_factor**2
 
 
 def points_that_fit(options: LaplacianOptions, modes: int = 0) -> int | None:

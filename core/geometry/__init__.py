@@ -1,6 +1,7 @@
 """Measurements on the points: neighbourhoods, components, normals, boundary, pairs; `cloud` runs the stages."""
 
 from .agreed import Agreed, Decisions
+from .bandwidth import neighbor_distance
 from .boundary import Boundary
 from .cloud import (
     Cloud,

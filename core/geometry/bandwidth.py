@@ -67,10 +67,12 @@ def smoothing_lengths(
         cell = _repeat(nearest.averaging(), cells.areas, ROUNDS)
         lengths = np.maximum(lengths, options.bandwidth_factor * np.sqrt(ENOUGH / np.pi * cell) / SUPPORT)
         return lengths * _widening(nearest, normals, quadrics, cells, boundary, lengths)
-    distance = _neighbor_distance(nearest.tree, options.neighbors, component)
     if options.bandwidth == "global":
-        mean = (decisions or Decisions()).settle("length", lambda: float(distance.mean()))
-        return np.full(len(distance), options.bandwidth_factor * mean)
+        found = (decisions or Decisions()).settle(
+            "length", lambda: float(neighbor_distance(nearest.tree, options.neighbors, component).mean())
+        )
+        return np.full(len(normals), options.bandwidth_factor * found)
+    distance = neighbor_distance(nearest.tree, options.neighbors, component)
     return options.bandwidth_factor * _repeat(nearest.averaging(), distance, 2)
 
 
@@ -127,7 +129,16 @@ def depth(nearest: Nearest, inside: Floats) -> Floats:
     return deepest
 
 
-def _neighbor_distance(tree: cKDTree, neighbors: int, component: Ints | None) -> Floats:
+def neighbor_distance(tree: cKDTree, neighbors: int, component: Ints | None) -> Floats:
+    """Return how far the n-th neighbour of every point is, (m,); in components of fewer points, how far it would be.
+
+    Parameters
+    ----------
+    tree : scipy.spatial.cKDTree
+        Of m points, whose components are further apart than that.
+    neighbors : int
+    component : ndarray, (m,) int, optional
+    """
     # The tree counts a point as its own first neighbour.
     distance: Floats = tree.query(tree.data, k=[min(neighbors + 1, tree.n)], workers=cores())[0][:, 0]
     if component is not None:

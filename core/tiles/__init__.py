@@ -1,6 +1,6 @@
 """A cloud in tiles: cut with halos, surveyed for what all must agree on, and measured one by one as within it."""
 
-from .cut import HALO, Tile, cut
+from .cut import HALO, Tile, cut, halo_of
 from .cutting import cut_to_store, points_of_tile
 from .measure import Measured, measure_tile
 from .modes import ask_for_modes

@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike
 from ..arguments import real, whole
 from ..errors import InvalidPointsError
 from ..geometry import check_points, find_nearest
+from ..memory import ADAPTIVE, points_in_kernel
+from ..options import LaplacianOptions
 from ..types import Bools, Floats, Ints
 
 HALO = 45.0  # spacings, at which all results of a tile are those of the whole cloud to 1e-6, see docs/tiles.md
@@ -80,6 +82,11 @@ def cut(points: ArrayLike, count: int, halo: float = HALO) -> list[Tile]:
     tile = plan.tile(points)
     order, ends = np.argsort(tile, kind="stable"), np.cumsum(np.bincount(tile, minlength=plan.tiles))
     return [_with_halo(points, spacing, own, halo) for own in np.split(order, ends[:-1])]
+
+
+def halo_of(options: LaplacianOptions) -> float:
+    """Return how wide halos are, in spacings: `HALO`, and in proportion more for kernels wider than those of the default."""
+    return HALO * max(1.0, points_in_kernel(options) / ADAPTIVE) ** 0.5
 
 
 class Plan:

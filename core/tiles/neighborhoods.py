@@ -27,6 +27,7 @@ from ..geometry import (
     join_touching,
     measure_noise,
     near_misfit,
+    neighbor_distance,
     number_sizes,
     remove_noise,
     scale_points,
@@ -246,6 +247,20 @@ def agree_on_bridges(shelf: Shelf, options: LaplacianOptions) -> Record:
     piece, gap, edge = (np.concatenate(list(shelf.told("bridges", name))) for name in ("piece", "gap", "edge"))
     bridges: Ints = edge[choose_bridges(piece[:, 0], piece[:, 1], gap)]
     return {"bridges": bridges}
+
+
+def find_length(site: Site, fitted: Fitted) -> tuple[None, Told]:
+    """Sum up how far the neighbour is by whose distance the kernel of all points is as wide."""
+    sample = fitted.surface.sample
+    distance = neighbor_distance(sample.nearest.tree, site.options.neighbors, sample.component)
+    own = distance[site.inner(sample.scaled)]
+    return None, {"sum": np.array(own.sum()), "count": np.array(len(own))}
+
+
+def agree_on_length(shelf: Shelf, options: LaplacianOptions) -> Record:
+    """Agree on the mean of that."""
+    total, count = (sum(map(float, shelf.told("length", name))) for name in ("sum", "count"))
+    return {"length": np.array(total / count)}
 
 
 def divided(site: Site, fitted: Fitted) -> tuple[Surface, bool]:

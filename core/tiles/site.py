@@ -13,7 +13,7 @@ from ..types import Array, Bools, Floats, Ints
 from .labels import named
 from .shelf import Part, Record, Shelf
 
-_SCALARS = ("scale", "spacing", "reach")
+_SCALARS = ("scale", "spacing", "reach", "length")
 _LABELS = {"component": "components", "sheet": "touching"}  # by the step that tells them
 
 

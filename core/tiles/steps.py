@@ -33,6 +33,18 @@ def _nothing(shelf: Shelf, options: LaplacianOptions) -> Record:
     return {}
 
 
+def _always(options: LaplacianOptions) -> bool:
+    return True
+
+
+def _of_sheets(options: LaplacianOptions) -> bool:
+    return options.sheets
+
+
+def _of_one_length(options: LaplacianOptions) -> bool:
+    return options.bandwidth == "global"
+
+
 @dataclass(frozen=True)
 class Step:
     """A step of the walk.
@@ -47,15 +59,15 @@ class Step:
         From the shelf and the options to what all tiles agree on then: small against the points.
     where : callable
         From the shelf to the numbers of the tiles at which the step is needed.
-    of_sheets : bool
-        Whether it is needed only where close sheets are kept apart.
+    needed : callable
+        From the options to whether they ask for it.
     """
 
     name: str
     local: Callable[[Site, Any], tuple[Any, Told]]
     merge: Callable[[Shelf, LaplacianOptions], Record] = _nothing
     where: Callable[[Shelf], Sequence[int]] = _all
-    of_sheets: bool = False
+    needed: Callable[[LaplacianOptions], bool] = _always
 
 
 _SURVEY = (
@@ -66,12 +78,13 @@ _SURVEY = (
     Step("noise", neighborhoods.find_noise, neighborhoods.agree_on_noise),
     Step("filling", neighborhoods.find_filling, neighborhoods.agree_on_filling, _at_first_if_filled),
     Step("sheets", neighborhoods.link_sheets, neighborhoods.agree_on_large_sheets),
-    Step("touching", neighborhoods.join_sheets, neighborhoods.agree_on_sheets, of_sheets=True),
+    Step("touching", neighborhoods.join_sheets, neighborhoods.agree_on_sheets, needed=_of_sheets),
     Step("patches", measures.orient_tile),
     Step("sides", measures.compare_sides, measures.agree_on_flips),
     Step("outside", measures.tell_sides, measures.agree_on_outside),
-    Step("pieces", neighborhoods.link_pieces, neighborhoods.agree_on_pieces, of_sheets=True),
-    Step("bridges", neighborhoods.find_bridges, neighborhoods.agree_on_bridges, of_sheets=True),
+    Step("pieces", neighborhoods.link_pieces, neighborhoods.agree_on_pieces, needed=_of_sheets),
+    Step("bridges", neighborhoods.find_bridges, neighborhoods.agree_on_bridges, needed=_of_sheets),
+    Step("length", neighborhoods.find_length, neighborhoods.agree_on_length, needed=_of_one_length),
     Step("areas", measures.find_areas, measures.agree_on_areas),
     Step("shares", measures.share_weights, measures.agree_on_shares, at_first),
 )
@@ -80,7 +93,7 @@ MEASURE = Step("measure", measures.measure)
 
 def survey_steps(options: LaplacianOptions) -> list[Step]:
     """Return the steps, in their order, after which all is agreed on."""
-    return [step for step in _SURVEY if options.sheets or not step.of_sheets]
+    return [step for step in _SURVEY if step.needed(options)]
 
 
 def visit(shelf: Shelf, step: Step, number: int, options: LaplacianOptions) -> None:

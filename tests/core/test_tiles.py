@@ -212,3 +212,26 @@ def test_curves_are_no_surface_in_tiles_either():
     circle = np.column_stack([np.cos(angle), np.sin(angle), 0.2 * np.sin(3.0 * angle)])
     with pytest.raises(core.NotASurfaceError, match="along a curve"):
         core.tiles.survey(circle, core.tiles.cut(circle, 3, 10.0))
+
+
+def test_one_smoothing_length_is_that_of_the_whole():
+    options = core.LaplacianOptions(bandwidth="global", neighbors=30, bandwidth_factor=0.5)
+    points = rods("several")[3000:]  # a quarter of the long one, and all else
+    laplacian = core.build_laplacian(points, options=options, agreed=LOW)
+    parts = core.tiles.cut(points, 2, HALO)
+    agreed = core.tiles.survey(points, parts, options, degree=LOW.degree)
+    np.testing.assert_allclose(agreed.length, laplacian.agreed.length, rtol=1e-12)
+    found = [core.tiles.measure_tile(points, tile, agreed, options) for tile in parts]
+    for name in ("areas", "mean_curvature"):
+        values = np.concatenate([getattr(part, name) for part in found])
+        known = laplacian.areas if name == "areas" else core.mean_curvature(laplacian)
+        same(values, known[np.concatenate([part.rows for part in found])], 1e-6)
+
+
+def test_halos_are_as_wide_as_kernels_ask_for():
+    kernels = {"adaptive": 1.0, "local": (9.0 * 100 / 60) ** 0.5}
+    for bandwidth, width in kernels.items():
+        for factor in (1.0, 2.0):
+            options = core.LaplacianOptions(bandwidth=bandwidth, bandwidth_factor=factor)
+            np.testing.assert_allclose(core.tiles.halo_of(options), core.tiles.HALO * factor * width)
+    assert core.tiles.halo_of(core.LaplacianOptions(bandwidth_factor=0.9)) == core.tiles.HALO
