@@ -125,26 +125,24 @@ def store(count=1_000_000, most=250_000, halo=core.tiles.HALO, degree=core.tiles
             del parts
         cut = time.process_time() - began
         tiles = core.tiles.Store(place)
-        disk, last, spent = 0, "", {}
+        disk = 0
 
-        def progress(step, fraction):
-            nonlocal disk, last, began
-            now = time.process_time()
-            spent[last], began = spent.get(last, 0.0) + now - began, now
-            last = step
+        def progress(stage, fraction):
+            nonlocal disk
             disk = max(disk, sum(path.stat().st_size for path in place.rglob("*.*")))
 
         began = time.process_time()
         core.tiles.run_steps(tiles, progress=progress)
-        spent[last] = spent.get(last, 0.0) + time.process_time() - began
+        spent = time.process_time() - began
+        steps = {step.name: sum(map(float, tiles.told(step.name, "seconds"))) for step in core.tiles.steps_of(tiles)}
         within = sum(len(tiles.own(number)) for number in tiles.alive)
         around = sum(len(tiles.part(number).points) for number in tiles.alive)
         final = sum(path.stat().st_size for path in place.rglob("*.*"))
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     print(f"{count:,} points in {tiles.count} tiles, with halos {around / within:.2f} times as many")
-    print("  CPU seconds:", ", ".join(f"{name} {value:.1f}" for name, value in {"cut": cut, **spent}.items() if name))
+    print("  CPU seconds:", ", ".join(f"{name} {value:.1f}" for name, value in {"cut": cut, **steps}.items()))
     print(f"  most memory {memory:.2f} GB, on disk {disk / count:.0f} bytes a point, at the end {final / count:.0f}")
-    beside_whole(count, cut + sum(spent.values()))
+    beside_whole(count, cut + spent)
 
 
 def run(count=5_000_000, workers=2, memory="2GB", most=0, folder=""):

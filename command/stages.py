@@ -1,5 +1,6 @@
 """Times of the stages of a computation, and its progress."""
 
+import math
 import sys
 from time import perf_counter
 
@@ -59,15 +60,18 @@ class ToldStages(StageTimes):
     ----------
     label : str
         What is computed.
+    each : float
+        Share of the work after which a stage gets a further line.
     """
 
-    def __init__(self, label):
+    def __init__(self, label, each=math.inf):
         super().__init__()
-        self._label = label
+        self._label, self._each, self._told = label, each, 0.0
 
     def __call__(self, stage, fraction):
-        if stage != self.stage:
+        if stage != self.stage or fraction >= self._told + self._each:
             self.tell(stage, fraction)
+            self._told = fraction
         super().__call__(stage, fraction)
 
     def tell(self, stage, fraction):

@@ -7,7 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 
 from . import core, tile_work
-from .inputs import add_las_choices, las_choices, parse_share
+from .inputs import add_choices, las_choices, parse_share
 from .records import SUFFIX
 from .rows import TABLES, write_rows, write_text
 from .settings import LAPLACIAN, add_setting, chosen
@@ -17,6 +17,8 @@ from .verb import ONE_LINE, Verb
 
 _SETTINGS = [LAPLACIAN[field.name] for field in fields(core.LaplacianOptions)]
 _FORMATS = (".ply", ".laz", ".las", ".csv", ".xyz", ".npy")
+_EACH = 0.01  # of the work is told
+_READ, _WRITTEN = 0.02, 0.02  # shares of a run that reading and writing files take about
 _REPORT = f"tiles{SUFFIX}"  # in the folder of a run
 
 
@@ -51,7 +53,7 @@ class _Cutting(_TileVerb):
         parser.add_argument("--tile-points", type=int, metavar="INT", help="points of a tile; else by the memory")
         for setting in _SETTINGS:
             add_setting(parser, setting)
-        add_las_choices(parser)
+        add_choices(parser)
 
     def expand(self, path, arguments):
         return Verb.expand(self, path, arguments)
@@ -61,32 +63,58 @@ class _Cutting(_TileVerb):
             parser.error("--part would leave points out: all inputs are one cloud")
         if arguments.tile_points is not None and arguments.tile_points < 1:
             parser.error("--tile-points must be at least 1")
+        if arguments.columns and not any(path.suffix.lower() in core.files.TEXTS for path in arguments.inputs):
+            parser.error(f"--columns is for files of text, {', '.join(core.files.TEXTS)}")
         arguments.sources, arguments.inputs = arguments.inputs, [arguments.folder]
 
-    def cut(self, arguments, count):
+    def cut(self, arguments, count, progress):
         """Return the store of a folder, for so many workers, and the notices of what was read; cut it if need be."""
         given = chosen(_SETTINGS, arguments)
         options = core.LaplacianOptions(
             **{name: value.lower() if isinstance(value, str) else value for name, value in given.items()}
         )
         folder, memory = arguments.folder / STORE, arguments.memory or core.tiles.memory_of_worker(count)
-        known = {"sources": [str(path.resolve()) for path in arguments.sources]}
+        known = {
+            "sources": [str(path.resolve()) for path in arguments.sources],
+            "read": {name: getattr(arguments, name) for name in ("classes", "withheld", "columns")},
+        }
         if folder.exists():
             store = core.tiles.Store(folder)
-            if (store.manifest["sources"], store.options) != (known["sources"], options):
+            if ({name: store.manifest.get(name) for name in known}, store.options) != (known, options):
                 raise core.PointCloudError(
                     f"{arguments.folder} has tiles of other files or settings. Choose another folder, or delete it."
                 )
-            return store, store.manifest["notices"]
-        most = arguments.tile_points or core.tiles.points_of_tile(memory, options)
-        sources = tile_work.Sources(arguments.sources, las_choices(arguments))
+            return store, _notices(store)
+        halo = core.tiles.halo_of(options)
+        most = arguments.tile_points or core.tiles.points_of_tile(memory, options, halo)
+        sources = tile_work.Sources(arguments.sources, las_choices(arguments), arguments.columns)
+        while True:
+            try:
+                store = _cut(sources, folder, most, options, halo, memory, known, progress)
+            except tile_work.Incomplete:
+                continue  # without the file that broke off
+            return store, _notices(store)
 
-        def chunks():
-            yield from sources()
-            known.update({"full color": sources.full, "notices": sources.notices})
 
-        store = core.tiles.cut_to_store(chunks, folder, most, options, memory=memory, known=known)
-        return store, store.manifest["notices"]
+def _notices(store):
+    """Return what is to be told of the files that were cut."""
+    columns = store.manifest["columns left out"]
+    missing = [f"Left out {', '.join(columns)}, which not all files have."] if columns else []
+    return [*store.manifest["notices"], *missing]
+
+
+def _cut(sources, folder, most, options, halo, memory, known, progress):
+    begin = 0.0
+
+    def chunks():
+        nonlocal begin
+        yield from sources(lambda share: progress("Read", begin + 0.5 * share))  # twice
+        begin = 0.5
+        broken = {str(path): str(error) for path, error in sources.broken.items()}
+        known.update({"full color": sources.full, "notices": sources.notices, "broken": broken})
+
+    progress("Read", 0.0)
+    return core.tiles.cut_to_store(chunks, folder, most, options, halo=halo, memory=memory, known=known)
 
 
 class TilesRun(_Cutting):
@@ -109,19 +137,18 @@ class TilesRun(_Cutting):
         _check_modes(parser, arguments, 0)
 
     def run(self, path, arguments, output):
-        store, notices = self.cut(arguments, arguments.workers)
-        if arguments.modes:
-            core.tiles.ask_for_modes(store, arguments.modes, arguments.mode_points)
-        with (
-            ToldStages(self.name) as stages,
-            tile_work.workers(arguments.workers, store.manifest["memory"], arguments.scheduler) as spread,
-        ):
+        with ToldStages(self.name, _EACH) as stages:
+            store, notices = self.cut(arguments, arguments.workers, _share(stages, 0.0, _READ))
+            if arguments.modes:
+                core.tiles.ask_for_modes(store, arguments.modes, arguments.mode_points)
+            with tile_work.workers(arguments.workers, store.manifest["memory"], arguments.scheduler) as spread:
 
-            def visit_all(step, numbers):
-                return spread(core.tiles.visit_tile, [(str(store.folder), step, number) for number in numbers])
+                def visit_all(step, numbers):
+                    return spread(core.tiles.visit_tile, [(str(store.folder), step, number) for number in numbers])
 
-            core.tiles.run_steps(store, visit_all, stages)
-            _write(store, path, store.alive, arguments.tile_format, spread)
+                core.tiles.run_steps(store, visit_all, _share(stages, _READ, 1.0 - _WRITTEN))
+                written = _share(stages, 1.0 - _WRITTEN, 1.0)
+                _write(store, path, store.alive, arguments.tile_format, spread, written)
         return {**_report(store, path, arguments.tile_format), "notices": notices}
 
 
@@ -132,7 +159,8 @@ class TilesCut(_Cutting):
     help = "cut a cloud larger than memory into tiles, the first stage"
 
     def run(self, path, arguments, output):
-        store, notices = self.cut(arguments, 1)
+        with ToldStages(self.name, _EACH) as stages:
+            store, notices = self.cut(arguments, 1, stages)
         return {"points": store.manifest["points"], "tiles": store.count, "notices": notices}
 
 
@@ -144,6 +172,18 @@ class _Stage(_TileVerb):
     def store(self, path):
         """Return the store in a folder."""
         return core.tiles.Store(path / STORE)
+
+    def visit(self, store, waiting, arguments):
+        """Take a step at a share of the tiles that wait for it; none where nothing waits."""
+        if waiting is None:
+            return {"step": None, "visited": 0, "waiting": 0}
+        (step, numbers), (number, count) = waiting, arguments.tiles
+        mine = [tile for tile in numbers if tile % count == number - 1]
+        with ToldStages(self.name, _EACH) as stages:
+            for done, tile in enumerate(mine):
+                stages(step.stage, done / len(mine))
+                core.tiles.visit_tile(store.folder, step.name, tile)
+        return {"step": step.name, "visited": len(mine), "waiting": len(numbers) - len(mine)}
 
 
 class TilesSurvey(_Stage):
@@ -159,8 +199,8 @@ class TilesSurvey(_Stage):
         store = self.store(path)
         waiting = core.tiles.pending(store)
         if store.agreed_after("measure") or waiting[0].name == "measure":
-            return {**_visit(store, None, arguments.tiles), "notices": ["The survey is done: measure the tiles."]}
-        return {**_visit(store, waiting, arguments.tiles), "notices": []}
+            return {**self.visit(store, None, arguments), "notices": ["The survey is done: measure the tiles."]}
+        return {**self.visit(store, waiting, arguments), "notices": []}
 
 
 class TilesAgree(_Stage):
@@ -198,7 +238,7 @@ class TilesMeasure(_Stage):
             waiting = None
         elif waiting[0].name != "measure":
             raise core.PointCloudError(f"{path} waits for the step {waiting[0].name} of the survey. Take it first.")
-        found = _visit(store, waiting, arguments.tiles)
+        found = self.visit(store, waiting, arguments)
         number, count = arguments.tiles
         measured = [tile for tile in store.alive if store.done("measure", tile)]
         mine = [tile for tile in measured if tile % count == number - 1]
@@ -227,7 +267,7 @@ class TilesModes(_Stage):
             raise core.PointCloudError(f"{path} waits for the step {waiting[0].name}. Measure the tiles first.")
         core.tiles.ask_for_modes(store, arguments.modes, arguments.mode_points)
         waiting = core.tiles.pending(store)
-        return {**_visit(store, waiting, arguments.tiles), "notices": [] if waiting else ["The modes are done."]}
+        return {**self.visit(store, waiting, arguments), "notices": [] if waiting else ["The modes are done."]}
 
 
 class TilesReport(_Stage):
@@ -245,41 +285,38 @@ class TilesReport(_Stage):
         found = _report(store, path, arguments.tile_format)
         if output is not None:
             rows = tile_work.tile_records(store, path, _suffix(arguments.tile_format))
+            rows += tile_work.file_records(store)
             names = ("tile", "file", "points", "total_area", "elapsed", "error")
             write_rows(output, [{name: row.get(name) for name in names} for row in rows])
         return {**found, "notices": []}
 
 
-def _visit(store, waiting, share):
-    """Take a step at a share of the tiles that wait for it; none where nothing waits."""
-    if waiting is None:
-        return {"step": None, "visited": 0, "waiting": 0}
-    step, numbers = waiting
-    mine = [number for number in numbers if number % share[1] == share[0] - 1]
-    for number in mine:
-        core.tiles.visit_tile(store.folder, step.name, number)
-    return {"step": step.name, "visited": len(mine), "waiting": len(numbers) - len(mine)}
+def _share(progress, begin, end):
+    """Return a progress callback whose fractions are those of a share of the work."""
+    return lambda stage, fraction: progress(stage, begin + (end - begin) * fraction)
 
 
-def _write(store, folder, numbers, form, spread):
+def _write(store, folder, numbers, form, spread, progress=lambda stage, fraction: None):
     """Write the results of some tiles."""
     suffix = _suffix(form)
     if not suffix:
         return
     many = [(str(store.folder), number, str(tile_work.tile_path(folder, number, suffix))) for number in numbers]
-    for _ in spread(tile_work.write_tile, many):
-        pass
+    progress("Write", 0.0)
+    for done, _ in enumerate(spread(tile_work.write_tile, many), 1):
+        progress("Write", done / len(many))
 
 
 def _report(store, folder, form):
     """Write the report of all tiles, a line of JSON for each, and return the totals with the errors."""
-    records = tile_work.tile_records(store, folder, _suffix(form))
+    records, files = tile_work.tile_records(store, folder, _suffix(form)), tile_work.file_records(store)
     shared = {"verb": "tiles run", "settings": store.manifest["options"], "stamps": {}, "ended": round(time.time(), 3)}
-    lines = [{"path": record["file"], **shared, **record} for record in records]
+    lines = [{"path": record["file"], **shared, **record} for record in [*files, *records]]
     write_text(folder / _REPORT, "".join(f"{json.dumps(line)}\n" for line in lines))
-    errors = [{"tile": record["tile"], "error": record["error"]} for record in records if "error" in record]
+    errors = [{"file": record["file"], "error": record["error"]} for record in files]
+    errors += [{"tile": record["tile"], "error": record["error"]} for record in records if "error" in record]
     modes = {"eigenvalues": tile_work.eigenvalues(store)} if store.agreed_after("spectrum") else {}
-    return {**tile_work.totals(store, records), **modes, "errors": errors}
+    return {**tile_work.totals(store, records), **modes, "failed_files": len(files), "errors": errors}
 
 
 def _suffix(form):

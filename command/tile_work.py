@@ -22,6 +22,8 @@ class Sources:
     ----------
     paths : sequence of pathlib.Path
     las : LasChoices
+    columns : str
+        Names of those of files of text; empty to find them.
 
     Attributes
     ----------
@@ -29,25 +31,81 @@ class Sources:
         Of the last time that they were read.
     full : float
         The number of a full color in them; zero if they have none.
+    broken : dict of pathlib.Path to PointCloudError
+        The files that cannot be read, and why. They are left out.
     """
 
-    def __init__(self, paths, las):
-        self._paths, self._las = paths, las
-        self.notices, self.full = [], 0.0
+    def __init__(self, paths, las, columns=""):
+        self._las, self._columns = las, columns
+        self._sizes = {path: path.stat().st_size if path.is_file() else 0 for path in paths}
+        self._counts = {}  # of points, as far as known
+        self.notices, self.full, self.broken = [], 0.0, {}
 
-    def __call__(self):
-        """Yield points, and their other numbers."""
-        notices, channels = [], []
-        for path in self._paths:
-            pieces = core.files.chunks(path, _PIECE, las=self._las)
-            for points, columns in pieces:
-                channels += [
-                    columns[name].max(keepdims=True) for name in core.files.CHANNELS[:3] if len(columns.get(name, ()))
-                ]
-                yield points, columns
-            notices += pieces.notices
-        self.notices = notices
-        self.full = core.files.full_color(np.concatenate(channels)) if channels else 0.0
+    def __call__(self, progress):
+        """Yield points, and their other numbers.
+
+        Parameters
+        ----------
+        progress : callable
+            Called with the share that has been read, by the sizes of files, and of points within them.
+
+        Raises
+        ------
+        Incomplete
+            A file broke off after points of it were given. It is left out the next time.
+        PointCloudError
+            None of the files can be read.
+        """
+        self.notices, channels = [], [np.zeros(0)]
+        total, before = max(sum(self._sizes.values()), 1), 0
+        for path, size in self._sizes.items():
+            count = 0
+            try:
+                for points, columns in () if path in self.broken else self._pieces(path):
+                    count += len(points)
+                    channels += [
+                        columns[name].max(keepdims=True)
+                        for name in core.files.CHANNELS[:3]
+                        if len(columns.get(name, ()))
+                    ]
+                    yield points, columns
+                    progress((before + size * min(count / self._counts.get(path, np.inf), 1.0)) / total)
+            except core.NotEnoughMemoryError:
+                raise
+            except core.PointCloudError as error:
+                self.broken[path] = error
+                if count:
+                    raise Incomplete from error
+            before += size
+            self._counts[path] = max(count, 1)
+            if not count and path not in self.broken:
+                self.notices.append(f"{path.name} has no points.")
+        if len(self.broken) == len(self._sizes):
+            raise next(iter(self.broken.values()))
+        self.notices += [f"Left out a file: {error}" for error in self.broken.values()]
+        found = np.concatenate(channels)
+        self.full = core.files.full_color(found) if len(found) else 0.0
+
+    def _pieces(self, path):
+        """Yield the points of a file, and note what is to be told of it."""
+        is_text, is_scan = (path.suffix.lower() in kinds for kinds in (core.files.TEXTS, core.files.SCANS))
+        pieces = core.files.chunks(path, _PIECE, las=self._las, columns=self._columns if is_text else "")
+        if is_scan:
+            self._counts[path] = max(core.files.extent(path).count, 1)
+        corners = []
+        for points, columns in pieces:
+            corners = [*corners, points.min(axis=0), points.max(axis=0)]
+            corners = [np.min(corners, axis=0), np.max(corners, axis=0)]
+            yield points, columns
+        notices = list(pieces.notices)
+        if corners:
+            table = core.files.PointTable(np.stack(corners), single=pieces.single, degrees=pieces.degrees)
+            notices += core.files.doubts(table, path)
+        self.notices += dict.fromkeys(notices)  # some files tell of that themselves
+
+
+class Incomplete(Exception):
+    """Points of a file were given, and more cannot be read."""
 
 
 def tile_path(folder, number, suffix):
@@ -158,6 +216,12 @@ def tile_records(store, folder, suffix):
         else:
             records.append({**record, "waiting": True})
     return records
+
+
+def file_records(store):
+    """Return what a report tells of each file that was left out."""
+    broken = store.manifest["broken"]
+    return [{"file": path, "elapsed": 0.0, "error": error} for path, error in broken.items()]
 
 
 def eigenvalues(store):

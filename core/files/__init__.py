@@ -1,7 +1,18 @@
 """Point files to arrays in double precision and back, usable outside Blender: numpy only, and laspy for LAS and LAZ."""
 
 from .digits import Digits, join_digits, split_digits
-from .formats import READABLE, SCANS, SPLATS, TEXTS, WRITABLE, precision_notices, read_points, reading, write_points
+from .formats import (
+    READABLE,
+    SCANS,
+    SPLATS,
+    TEXTS,
+    WRITABLE,
+    doubts,
+    precision_notices,
+    read_points,
+    reading,
+    write_points,
+)
 from .frames import frame_number, numbered_files, order_frames
 from .las_choices import LasChoices, parse_classes
 from .las_writing import LASER_FILES, write_las

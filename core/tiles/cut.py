@@ -85,7 +85,7 @@ def cut(points: ArrayLike, count: int, halo: float = HALO) -> list[Tile]:
 
 
 def halo_of(options: LaplacianOptions) -> float:
-    """Return how wide halos are, in spacings: `HALO`, and in proportion more for kernels wider than those of the default."""
+    """Return how wide halos are, in spacings: `HALO`, and wider in proportion for kernels wider than by default."""
     return HALO * max(1.0, points_in_kernel(options) / ADAPTIVE) ** 0.5
 
 

@@ -272,4 +272,4 @@ def list_boxes(shelf: Any, options: LaplacianOptions) -> Record:
     return record
 
 
-HALOS = (Step("extent", find_extent, list_boxes), Step("halo", find_halo))
+HALOS = (Step("extent", "Tiles", 1.4, find_extent, list_boxes), Step("halo", "Tiles", 0.1, find_halo))

@@ -93,7 +93,7 @@ def carry_modes(site: Site, state: Any) -> tuple[None, Told]:
 
 
 MODES = (
-    Step("candidates", find_candidates),
-    Step("spectrum", find_modes, where=at_first),
-    Step("modes", carry_modes),
+    Step("candidates", "Modes", 0.1, find_candidates),
+    Step("spectrum", "Modes", 32.0, find_modes, where=at_first),
+    Step("modes", "Modes", 3.4, carry_modes),
 )

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from ..types import Progress
 from .cutting import HALOS
 from .modes import MODES
-from .steps import MEASURE, Step, agree, survey_steps, visit
+from .steps import MEASURE, Step, agree, part_of, survey_steps, visit
 from .store import Store
 
 
@@ -80,7 +80,8 @@ def run_steps(
         Takes the name of a step and the numbers of tiles, and calls `visit_tile` for each, in any order and any
         process; yields their numbers as they are done. One after the other in this process if not given.
     progress : callable, optional
-        Called as ``progress(step, fraction)``; may raise `Cancelled`.
+        Called as ``progress(stage, fraction)``, where the fraction is that of the work of all steps; may raise
+        `Cancelled`.
 
     Examples
     --------
@@ -94,14 +95,16 @@ def run_steps(
     >>> print(area.round(1))
     12.6
     """
-    report = progress or (lambda step, fraction: None)
+    report = progress or (lambda stage, fraction: None)
 
     def one_by_one(step: str, numbers: Sequence[int]) -> Iterable[int]:
         return (visit_tile(store.folder, step, number) for number in numbers)
 
     while (waiting := pending(store)) is not None:
         step, numbers = waiting
-        report(step.name, 0.0)
-        for done, _ in enumerate((visit_all or one_by_one)(step.name, numbers), 1):
-            report(step.name, done / len(numbers))
+        begin, end = part_of(steps_of(store), step)
+        count = len(step.where(store))
+        report(step.stage, begin)
+        for left, _ in enumerate((visit_all or one_by_one)(step.name, numbers), 1 - len(numbers)):
+            report(step.stage, end + (end - begin) * left / count)
         settle(store)

@@ -15,7 +15,7 @@ from ..types import Progress
 from .cut import Tile
 from .shelf import Memory, Part
 from .site import Site
-from .steps import agree, survey_steps, visit
+from .steps import agree, part_of, survey_steps, visit
 
 DEGREE = 12  # of the polynomials for areas: they reach less than a halo of 45 spacings, see docs/tiles.md
 
@@ -74,10 +74,11 @@ def survey(
     shelf = Memory(points, tiles, {"center": center, "scale": scale, "degree": np.array(degree)}, last="areas")
     report = progress or (lambda stage, fraction: None)
     steps = survey_steps(options)
-    for done, step in enumerate(steps):
+    for step in steps:
         where = step.where(shelf)
+        begin, end = part_of(steps, step)
         for place, number in enumerate(where):
-            report("Survey", (done + place / len(where)) / len(steps))
+            report(step.stage, begin + (end - begin) * place / len(where))
             visit(shelf, step, number, options)
         shelf.record |= agree(shelf, step, options)
     return _whole(shelf, tiles, options)

@@ -49,10 +49,16 @@ def joined(store, name):
 
 
 @pytest.fixture(scope="module")
-def measured(tmp_path_factory):
-    store = stored(tmp_path_factory.mktemp("tiles"), rod(), 800)
-    core.tiles.run_steps(store)
-    return store
+def walk(tmp_path_factory):
+    """A store after all steps, and what was told of the progress."""
+    store, told = stored(tmp_path_factory.mktemp("tiles"), rod(), 800), []
+    core.tiles.run_steps(store, progress=lambda *given: told.append(given))
+    return store, told
+
+
+@pytest.fixture
+def measured(walk):
+    return walk[0]
 
 
 @cache
@@ -82,6 +88,16 @@ class TestStore:
         assert other.count == 3
         for name in ("normals", "areas", "mean_curvature"):
             same(joined(other, name), joined(measured, name)[order])
+
+    def test_tells_how_far_it_is(self, walk):
+        stages, fractions = zip(*walk[1], strict=True)
+        assert list(fractions) == sorted(fractions)
+        assert fractions[0] == 0.0
+        np.testing.assert_allclose(fractions[-1], 1.0)
+        found = [fraction for stage, fraction in walk[1] if stage == "Areas"]
+        assert len(found) == 1 + 4  # at the start, and after each tile
+        np.testing.assert_allclose(np.diff(found), np.ptp(found) / 4)
+        assert stages[-1] == "Operator"
 
     def test_keeps_no_states_and_no_parts_at_the_end(self, measured):
         names = {path.name.partition(".")[0] for path in measured.folder.rglob("*")}

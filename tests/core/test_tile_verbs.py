@@ -1,6 +1,7 @@
 """The verbs for clouds larger than memory: from files to files of results, in one go or stage by stage."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 import core
 from command import tile_work, verbs
 from command.main import run as run_command
+from command.stages import ToldStages
 from core.files import PointTable, read_points, write_points
 
 LENGTH, RADIUS, COUNT = 10.0, 0.25, 2400
@@ -78,7 +80,7 @@ class TestRun:
         assert (line["files"], line["failed"], line["points"]) == (2, 0, COUNT)
 
     def test_other_files_or_settings_need_another_folder(self, run, scans, done):
-        for arguments in ((scans / "a.ply",), (scans, "--boundary", "off")):
+        for arguments in ((scans / "a.ply",), (scans, "--boundary", "off"), (scans, "--classes", "2")):
             code, [line] = run("tiles", "run", *arguments, "--out-dir", done)
             assert (code, "other files or settings" in line["error"]) == (1, True)
 
@@ -89,7 +91,7 @@ class TestRun:
 
     @pytest.mark.parametrize(
         "wrong",
-        [("--workers", "0"), ("--memory", "much"), ("--part", "1/2"), ("--bandwidth", "global"), ("--tile-points", 0)],
+        [("--workers", "0"), ("--memory", "much"), ("--part", "1/2"), ("--columns", "x y z"), ("--tile-points", 0)],
     )
     def test_wrong_usage(self, run, scans, tmp_path, wrong):
         assert run("tiles", "run", scans, "--out-dir", tmp_path / "out", *wrong) == (2, [])
@@ -143,6 +145,110 @@ def test_a_broken_tile_is_told_and_the_others_written(run, scans, tmp_path):
     assert (code, line["failed_tiles"], line["errors"][0]["tile"]) == (0, 1, 1)
     assert [path.name for path in out.glob("tile_*")] == ["tile_000000.ply"]
     assert run("report", out)[1][0]["failed"] == 1
+
+
+def write_delivery(folder, rod):
+    """Write files of a survey: a rod in two halves, and others far away that are as files should not be."""
+    folder.mkdir()
+    middle = np.median(rod[:, 0])
+    for name, half in (("a.xyz", rod[rod[:, 0] < middle]), ("b.xyz", rod[rod[:, 0] >= middle])):
+        np.savetxt(folder / name, np.column_stack([half[:, ::-1], np.full(len(half), 7.0)]), fmt="%.17g")
+    (folder / "garbage.laz").write_bytes(b"LASF" + bytes(1000))
+    (folder / "empty.csv").write_text("nan,nan,nan,0\n")
+    write_points(folder / "three.ply", PointTable(0.1 * np.eye(3) - 100.0))
+    write_points(folder / "volume.ply", PointTable(1000.0 + np.random.default_rng(1).random((6000, 3))))
+    write_points(folder / "whole.ply", PointTable(500.0 + rod))
+    data = (folder / "whole.ply").read_bytes()
+    (folder / "cut_off.ply").write_bytes(data[:-100])
+    (folder / "whole.ply").unlink()
+
+
+def test_what_is_wrong_with_some_files_of_a_delivery_is_told_and_the_others_done(run, scans, tmp_path):
+    rod = np.concatenate([read_points(scans / f"{name}.ply").points for name in "ab"])[3:]
+    write_delivery(tmp_path / "files", rod)
+    out = tmp_path / "out"
+    options = ("--columns", "z y x intensity", *OPTIONS, "--memory", "15MB")
+    code, [line] = run("tiles", "run", tmp_path / "files", "--out-dir", out, *options)
+    assert (code, line["points"], line["measured_points"]) == (0, COUNT + 6000, COUNT)
+    broken = [error for error in line["errors"] if "file" in error]
+    assert [Path(error["file"]).name for error in broken] == ["cut_off.ply", "garbage.laz"]
+    full = [error for error in line["errors"] if "tile" in error]
+    assert len(full) == line["failed_tiles"] > 0
+    assert all("fill a volume" in error["error"] for error in full)
+    assert "empty.csv has no points." in line["notices"]
+    assert sum(notice.startswith("Left out a file") for notice in line["notices"]) == line["failed_files"] == 2
+    tables = [read_points(path) for path in sorted(out.glob("tile_*.ply"))]
+    on = np.concatenate([table.attributes["lb_component"] >= 0 for table in tables])
+    assert np.count_nonzero(~on) == 3  # far from all
+    assert "Left out intensity, which not all files have." in line["notices"]
+    found = np.concatenate([table.points for table in tables])[on]
+    np.testing.assert_array_equal(np.sort(found, axis=0), np.sort(rod, axis=0))
+    lines = [json.loads(text) for text in (out / "tiles.jsonl").read_text().splitlines()]
+    assert any("left out of the operator: 3 " in notice for record in lines for notice in record.get("notices", ()))
+    assert run("report", out)[1][0]["failed"] == 2 + len(full)
+
+
+def test_columns_of_text_by_their_names(run, tmp_path):
+    np.savetxt(tmp_path / "a.txt", np.column_stack([core.example_sphere(), np.arange(800)])[:, ::-1])
+    out = tmp_path / "out"
+    assert run("tiles", "cut", tmp_path / "a.txt", "--out-dir", out, "--columns", "number z y x")[0] == 0
+    store = core.tiles.Store(out / "store")
+    assert store.columns(0)["number"].dtype == np.float64
+    order = np.argsort(store.columns(0)["number"])
+    np.testing.assert_array_equal(store.own(0)[order], core.example_sphere())
+
+
+class TestSources:
+    def test_tell_how_much_is_read(self, scans):
+        sources, told = tile_work.Sources([scans / "a.ply", scans / "b.ply"], core.files.LasChoices()), []
+        for passes in (1, 2):
+            assert sum(len(points) for points, _ in sources(told.append)) == COUNT
+            assert len(told) == 2 * passes
+        first, second = ((scans / f"{name}.ply").stat().st_size for name in "ab")
+        share = first / (first + second)
+        np.testing.assert_allclose(told, [0.0, share, share, 1.0])  # points are counted in the first pass
+
+    def test_begin_again_without_a_file_that_breaks_off(self, tmp_path, monkeypatch):
+        paths = [tmp_path / f"{name}.ply" for name in "ab"]
+        for path in paths:
+            write_points(path, PointTable(core.example_sphere()))
+        guarded = core.files.Chunks._guarded
+
+        def breaking_off(self):
+            yield from guarded(self)
+            if self._path == paths[0]:
+                raise core.PointCloudError("It breaks off.")
+
+        monkeypatch.setattr(core.files.Chunks, "_guarded", breaking_off)
+        sources = tile_work.Sources(paths, core.files.LasChoices())
+        given = sources(lambda share: None)
+        with pytest.raises(tile_work.Incomplete):
+            list(given)
+        assert list(sources.broken) == paths[:1]
+        assert sum(len(points) for points, _ in sources(lambda share: None)) == 800
+        assert sources.notices == ["Left out a file: It breaks off."]
+
+    def test_all_broken_are_an_error(self, tmp_path):
+        (tmp_path / "a.las").write_bytes(b"")
+        with pytest.raises(core.PointCloudError, match=r"a\.las"):
+            list(tile_work.Sources([tmp_path / "a.las", tmp_path / "b.las"], core.files.LasChoices())(print))
+
+    def test_degrees_and_single_precision_are_told(self, tmp_path):
+        rng = np.random.default_rng(0)
+        np.savetxt(tmp_path / "a.xyz", rng.random((50, 3)) * [1e-3, 1e-3, 10.0] + [10.0, 50.0, 0.0])
+        np.save(tmp_path / "b.npy", (rng.random((50, 3)) + [4e5, 5e6, 0.0]).astype(np.float32))
+        sources = tile_work.Sources(sorted(tmp_path.iterdir()), core.files.LasChoices())
+        assert sum(len(points) for points, _ in sources(lambda share: None)) == 100
+        assert "look like degrees" in sources.notices[0]
+        assert "kept in single precision" in sources.notices[1]
+
+
+def test_progress_is_told_by_stages_and_within_them(capsys):
+    with ToldStages("tiles run", 0.1) as stages:
+        for stage, fraction in (("Read", 0.0), ("Read", 0.05), ("Read", 0.1), ("Areas", 0.11), ("Areas", 0.5)):
+            stages(stage, fraction)
+    found = [text.removeprefix("tiles run: ") for text in capsys.readouterr().err.splitlines()]
+    assert found == ["Read, 0%", "Read, 10%", "Areas, 11%", "Areas, 50%"]
 
 
 @pytest.mark.parametrize(("text", "size"), [("2GB", 2 << 30), ("1.5 mb", 3 << 19), ("700", 700), ("1KB", 1024)])
