@@ -66,6 +66,46 @@ def write_e57(path):
     path.write_bytes(seal(make_e57(*scans)))
 
 
+def write_rows(path, rows, names=""):
+    path.write_text("".join(f"{row}\n" for row in ([names] if names else []) + rows))
+
+
+def write_nameless(path):
+    """With columns that only all rows tell: the first colors are 0 and 1, and normals are missing in half of them."""
+    rng = np.random.default_rng(3)
+    colors, normals = rng.integers(0, 256, (COUNT, 3)), rng.normal(size=(COUNT, 3))
+    colors[:300] %= 2
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    normals[:300] = 0.0
+    forms = [*3 * ["%.3f"], *3 * ["%d"], *3 * ["%.6f"]]
+    np.savetxt(path, np.column_stack([cloud(), colors, normals]), forms)
+
+
+def write_survey(path):
+    """With whole numbers of 64 bits, empty cells, a comment, and a column that is text in a late row only."""
+    texts = [
+        f"{x},{y},{z},{2**60 + 3 * row},{'' if row % 3 else row},{'late' if row == 600 else row},,{row / 7}"
+        for row, (x, y, z) in enumerate(cloud().tolist())
+    ]
+    texts[400:400] = ["# moved", ""]
+    write_rows(path, texts, "x,y,z,stamp,sparse,note,nothing,gps_time")
+
+
+def write_scans(path):
+    """Of two scans with their numbers of points."""
+    rows = [f"{x} {y} {z} {row % 9} {row % 256} 7 0" for row, (x, y, z) in enumerate(cloud().tolist())]
+    write_rows(path, ["300", *rows[:300], str(COUNT - 300), *rows[300:]])
+
+
+def write_obj(path):
+    rows = [f"v {x} {y} {z} {row / COUNT:.4f} 0.5 0.25" for row, (x, y, z) in enumerate(cloud().tolist())]
+    write_rows(path, ["# points", *rows[:200], "f 1 2 3", *rows[200:]])
+
+
+def write_columnwise(path):
+    np.save(path, np.asfortranarray((cloud() - FAR).astype(np.float32)))
+
+
 WRITERS = {
     "a.las": write_las,
     "a.laz": write_las,
@@ -75,7 +115,18 @@ WRITERS = {
     "a.xyz": write_table,
     "a.csv": write_table,
     "a.e57": write_e57,
+    "a.txt": write_nameless,
+    "b.csv": write_survey,
+    "a.pts": write_scans,
+    "a.obj": write_obj,
+    "a.npy": lambda path: np.save(path, cloud().astype(">f8")),
+    "b.npy": write_columnwise,
+    "a.npz": lambda path: np.savez(path, points=cloud()),
+    "b.npz": lambda path: np.savez_compressed(path, points=np.asfortranarray(cloud())),
 }
+
+
+_UNEVEN = ("a.las", "a.laz", "a.copc.laz", "a.e57")  # withheld points, and scans
 
 
 @pytest.mark.parametrize("size", [1, 100, 256, 10_000])
@@ -94,6 +145,7 @@ def test_pieces_are_the_whole(tmp_path, name, size):
     for column, values in whole.attributes.items():
         assert table.attributes[column].dtype == values.dtype
         assert_array_equal(table.attributes[column], values)
+    assert len(pieces) == -(-len(whole.points) // size) or name in _UNEVEN
     assert (table.colors is None) == (whole.colors is None)
     if whole.colors is not None:
         assert_array_equal(table.colors, whole.colors)
@@ -153,21 +205,36 @@ def test_classes_of_las_files(tmp_path):
     assert list(chunks(tmp_path / "a.las", las=LasChoices(frozenset({99})))) == []
 
 
-@pytest.mark.parametrize("name", ["a.las", "a.laz", "a.ply"])
+@pytest.mark.parametrize("name", ["a.las", "a.laz", "a.ply", "a.xyz", "a.npy", "a.npz"])
 def test_memory_is_that_of_a_piece(tmp_path, name):
-    places = FAR + np.random.default_rng(0).uniform(0.0, 100.0, (400_000, 3))
-    if name == "a.ply":
-        write_points(tmp_path / name, PointTable(places))
-    else:
+    count = 60_000 if name == "a.xyz" else 400_000
+    places = FAR + np.random.default_rng(0).uniform(0.0, 100.0, (count, 3))
+    if name in ("a.las", "a.laz"):
         write_las(tmp_path / name, places)
+    elif name == "a.npy":
+        np.save(tmp_path / name, places)
+    elif name == "a.npz":
+        np.savez(tmp_path / name, points=places)
+    else:
+        write_points(tmp_path / name, PointTable(places))
     tracemalloc.start()
     try:
-        count = sum(len(piece) for piece, _ in chunks(tmp_path / name, 10_000))
+        found = sum(len(piece) for piece, _ in chunks(tmp_path / name, count // 40))
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    assert count == (400_000 if name == "a.ply" else 360_000)
+    assert found == (0.9 * count if name in ("a.las", "a.laz") else count)
     assert peak < places.nbytes
+
+
+def test_columns_of_text_by_the_names_given(tmp_path):
+    write_nameless(tmp_path / "a.txt")
+    whole = read_points(tmp_path / "a.txt", "z y x a b - ...")
+    pieces = [*chunks(tmp_path / "a.txt", 100, columns="z y x a b - ...")]
+    assert_array_equal(np.concatenate([points for points, _ in pieces]), whole.points)
+    assert_array_equal(np.concatenate([numbers["a"] for _, numbers in pieces]), whole.attributes["a"])
+    with pytest.raises(PointCloudError, match="names its columns itself"):
+        chunks(tmp_path / "a.ply", columns="x y z")
 
 
 def test_an_error_of_the_caller_is_not_one_of_the_file(tmp_path):

@@ -208,7 +208,7 @@ class TestSources:
         share = first / (first + second)
         np.testing.assert_allclose(told, [0.0, share, share, 1.0])  # points are counted in the first pass
 
-    def test_begin_again_without_a_file_that_breaks_off(self, tmp_path, monkeypatch):
+    def test_begin_again_without_a_file_that_breaks_off(self, run, tmp_path, monkeypatch):
         paths = [tmp_path / f"{name}.ply" for name in "ab"]
         for path in paths:
             write_points(path, PointTable(core.example_sphere()))
@@ -227,6 +227,8 @@ class TestSources:
         assert list(sources.broken) == paths[:1]
         assert sum(len(points) for points, _ in sources(lambda share: None)) == 800
         assert sources.notices == ["Left out a file: It breaks off."]
+        _, [line] = run("tiles", "cut", *paths, "--out-dir", tmp_path / "out", "--memory", "4GB")
+        assert (line["points"], line["notices"]) == (800, sources.notices)
 
     def test_all_broken_are_an_error(self, tmp_path):
         (tmp_path / "a.las").write_bytes(b"")
