@@ -104,6 +104,19 @@ def _listed(source):
 
 def files_in(folder):
     """Return the frames in a folder, numbered files of one name; or else all files with points, ordered by numbers."""
+    paths = all_files_in(folder)
+    try:
+        frames = core.files.numbered_files(folder)
+    except core.PointCloudError:  # files of several names, or without numbers
+        return paths
+    rest = sorted({path.name for path in paths} - {path.name for path in frames})
+    if rest:
+        print(f"{folder}: left out {', '.join(rest)}, which are no frames", file=sys.stderr, flush=True)
+    return frames
+
+
+def all_files_in(folder):
+    """Return all files with points in a folder, ordered by numbers."""
     try:
         paths = [path for path in folder.iterdir() if path.suffix.lower() in _READ and path.is_file()]
     except OSError as error:
@@ -112,14 +125,7 @@ def files_in(folder):
         ) from error
     if not paths:
         raise core.PointCloudError(f"{folder} has no files with points. Name one with files of {', '.join(_READ)}.")
-    try:
-        frames = core.files.numbered_files(folder)
-    except core.PointCloudError:  # files of several names, or without numbers
-        return sorted(paths, key=lambda path: _natural(path.name))
-    rest = sorted({path.name for path in paths} - {path.name for path in frames})
-    if rest:
-        print(f"{folder}: left out {', '.join(rest)}, which are no frames", file=sys.stderr, flush=True)
-    return frames
+    return sorted(paths, key=lambda path: _natural(path.name))
 
 
 _READ = (*core.files.READABLE, *core.files.SPLATS)

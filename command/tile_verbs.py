@@ -7,7 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 
 from . import core, tile_work
-from .inputs import add_choices, las_choices, parse_share
+from .inputs import add_choices, all_files_in, las_choices, parse_share
 from .records import SUFFIX
 from .rows import TABLES, write_rows, write_text
 from .settings import LAPLACIAN, add_setting, chosen
@@ -56,7 +56,7 @@ class _Cutting(_TileVerb):
         add_choices(parser)
 
     def expand(self, path, arguments):
-        return Verb.expand(self, path, arguments)
+        return all_files_in(path) if path.is_dir() else [path]
 
     def check(self, parser, arguments):
         if arguments.part != (1, 1):

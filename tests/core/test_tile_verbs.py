@@ -198,6 +198,13 @@ def test_columns_of_text_by_their_names(run, tmp_path):
     np.testing.assert_array_equal(store.own(0)[order], core.example_sphere())
 
 
+def test_all_files_of_a_folder_are_of_the_cloud(run, tmp_path):
+    for name in ("scan_1", "scan_2", "other"):  # not the frames alone, as for verbs of many files
+        write_points(tmp_path / "in" / f"{name}.ply", PointTable(core.example_sphere()))
+    _, [line] = run("tiles", "cut", tmp_path / "in", "--out-dir", tmp_path / "out", "--memory", "4GB")
+    assert line["points"] == 2400
+
+
 class TestSources:
     def test_tell_how_much_is_read(self, scans):
         sources, told = tile_work.Sources([scans / "a.ply", scans / "b.ply"], core.files.LasChoices()), []
