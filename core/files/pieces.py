@@ -16,12 +16,15 @@ from .formats import SCANS, TEXTS, check_columns, doubts, read_points, reading
 from .las import Tally, las_pieces, opened_las, settle_columns
 from .las_choices import LasChoices
 from .ply import ply_pieces
+from .ptx import ptx_pieces
 from .table import CHANNELS, Missed, PointTable, check_places, full_color
 from .text import column_pieces, scan_pieces, vertex_pieces
 
-_PIECES: dict[str, Callable[..., Iterator[tuple[PointTable, dict[str, Array]]] | None]] = {  # None: only as a whole
+# None where a PLY file is read as a whole only, and where a text is a PTX file.
+_PIECES: dict[str, Callable[..., Iterator[tuple[PointTable, dict[str, Array]]] | None]] = {
     **dict.fromkeys(TEXTS, column_pieces),
     ".pts": scan_pieces,
+    ".ptx": ptx_pieces,
     ".obj": vertex_pieces,
     ".ply": ply_pieces,
     ".npy": array_pieces,
@@ -99,7 +102,9 @@ class Chunks:
             return
         given = {"columns": self._columns} if self._columns else {}
         found = _PIECES[suffix](self._path, self._size, self.notices, **given) if suffix in _PIECES else None
-        for table, channels in found or self._read_whole(suffix):
+        if found is None and suffix in TEXTS:
+            found = ptx_pieces(self._path, self._size, self.notices)
+        for table, channels in self._read_whole(suffix) if found is None else found:
             self.single, self.degrees = self.single or table.single, self.degrees or table.degrees
             yield table.points, {**channels, **table.attributes}
 
@@ -134,7 +139,7 @@ def chunks(
     """Read the points of a file of one of the kinds in `READABLE` in pieces.
 
     Memory is that of a piece for LAS, LAZ, COPC, binary PLY files without lists, OBJ, arrays of numpy, and columns of
-    text, which are read once more before, for what they hold. PCD, PTX and other PLY files are read as a whole, E57
+    text, which are read once more before, for what they hold. PCD and other PLY files are read as a whole, E57 and PTX
     files scan by scan, and cut in pieces then.
 
     Parameters
@@ -270,6 +275,12 @@ def _join_column(name: str, pieces: Sequence[tuple[Floats, dict[str, Array]]]) -
     given = [(len(points), attributes.get(name)) for points, attributes in pieces]
     there = [values for _, values in given if values is not None]
     kind, shape = np.result_type(*there), there[0].shape[1:]
-    full = np.full(shape, full_color(np.concatenate(there)) if name in CHANNELS else 0, kind)
+    usual = 0.0
+    if name in CHANNELS:
+        alike = CHANNELS[:3] if name in CHANNELS[:3] else (name,)  # a full color is that of all three
+        usual = full_color(
+            np.concatenate([numbers[each] for _, numbers in pieces for each in alike if each in numbers])
+        )
+    full = np.full(shape, usual, kind)
     columns = [np.broadcast_to(full, (count, *shape)) if values is None else values for count, values in given]
     return np.concatenate(columns), sum(count for count, values in given if values is None)

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InvalidPointsError
-from ..types import Bools, Floats
+from ..types import Array, Bools, Floats
 from .lines import brief, is_number, read_text
-from .table import SCANNER, PointTable, from_columns
+from .table import SCANNER, PointTable, from_columns, gather_columns
 
 _HEAD = 10  # lines: columns, rows, the scanner's position and axes, and four rows of a matrix
 _MOST_DIGITS = 9  # of a number of columns or rows
@@ -40,15 +40,43 @@ def read_ptx(path: Path) -> PointTable:
     InvalidPointsError
         It is no PTX file, or announces another number of points than it has; the text says where.
     """
-    scans: list[tuple[Floats, Floats]] = []
-    missed = 0
+    scans = [(values, center, missed) for values, center, missed, _ in _scans(path)]
+    return _join([(values, center) for values, center, _ in scans], sum(missed for *_, missed in scans), path)
+
+
+def ptx_pieces(path: Path, size: int, notices: list[str]) -> Iterator[tuple[PointTable, dict[str, Array]]]:
+    """Yield the points of each scan as `gather_columns` makes them, whatever the size; notices come at the end."""
+    total = 0
+    for number, (values, center, missed, several) in enumerate(_scans(path)):
+        total += missed
+        table, channels = gather_columns(dict(zip(_names(values), values.T, strict=True)), path)
+        table.attributes[SCANNER] = np.tile(center, (len(values), 1))
+        if several:
+            table.attributes["scan"] = np.full(len(values), number, dtype=np.int32)
+        yield table, channels
+    notices += _missed_notices(total, path)
+
+
+def _scans(path: Path) -> Iterator[tuple[Floats, Floats, int, bool]]:
+    """Yield the points, (n, k), of each scan, the scanner's position, the missed rays, and if there are other scans."""
     numbered = enumerate(chain.from_iterable(read_text(path)), start=1)
     lines = ((number, line) for number, line in numbered if _is_filled(line))
-    while head := [*islice(lines, _HEAD)]:
-        values, center, misses = _read_scan(lines, head, len(scans), path)
-        scans.append((values, center))
-        missed += misses
-    return _join(scans, missed, path)
+    count, head = 0, [*islice(lines, _HEAD)]
+    while head:
+        found = _read_scan(lines, head, count, path)
+        count, head = count + 1, [*islice(lines, _HEAD)]
+        yield *found, bool(count > 1 or head)
+
+
+def _names(values: Floats) -> list[str]:
+    """Return the names of the numbers of a point, of which some have no intensity or colors."""
+    names = _NAMES if values.shape[1] != 6 else [name for name in _NAMES if name != "intensity"]
+    return list(names[: values.shape[1]])
+
+
+def _missed_notices(missed: int, path: Path) -> Iterator[str]:
+    if missed:
+        yield f"{path.name}: left out {missed} rays that hit nothing (0 0 0)."
 
 
 def _is_filled(line: str) -> bool:
@@ -154,8 +182,7 @@ def _join(scans: list[tuple[Floats, Floats]], missed: int, path: Path) -> PointT
     columns: dict[str, Floats] = {}
     colored = np.zeros(total, bool)
     for start, (values, _) in zip(np.cumsum([0, *counts]), scans, strict=False):
-        names = _NAMES if values.shape[1] != 6 else [name for name in _NAMES if name != "intensity"]
-        for name, column in zip(names, values.T, strict=False):
+        for name, column in zip(_names(values), values.T, strict=True):
             columns.setdefault(name, np.zeros(total))[start : start + len(values)] = column
         colored[start : start + len(values)] = values.shape[1] > 4
     table = from_columns({name: columns.get(name, np.zeros(0)) for name in columns or "xyz"}, path)
@@ -164,6 +191,5 @@ def _join(scans: list[tuple[Floats, Floats]], missed: int, path: Path) -> PointT
     table.attributes[SCANNER] = np.repeat([center for _, center in scans] or np.empty((0, 3)), counts or 0, axis=0)
     if len(scans) > 1:
         table.attributes["scan"] = np.repeat(np.arange(len(scans), dtype=np.int32), counts)
-    if missed:
-        table.notices.append(f"{path.name}: left out {missed} rays that hit nothing (0 0 0).")
+    table.notices += _missed_notices(missed, path)
     return table

@@ -88,7 +88,7 @@ def column_pieces(path: Path, size: int | None, notices: list[str], columns: str
     Returns
     -------
     iterator of (PointTable, dict of str to ndarray), or None
-        None where the file is a PTX file, which has pieces of its own.
+        None where the file is a PTX file; see `ptx_pieces`.
     """
     return _pieces(partial(read_text, path, _SKIPPED), path, size, notices, columns, {})
 

@@ -106,6 +106,19 @@ def write_columnwise(path):
     np.save(path, np.asfortranarray((cloud() - FAR).astype(np.float32)))
 
 
+def write_ptx(path):
+    """Of two scans, with missed rays, in their own coordinates."""
+    texts = []
+    for rows, place in ((slice(0, 300), 4.0), (slice(300, COUNT), -7.0)):
+        count = len(range(COUNT)[rows])
+        texts += [f"{count + 5}", "1", f"{place} 0 0", "1 0 0", "0 1 0", "0 0 1", "1 0 0 0", "0 1 0 0", "0 0 1 0"]
+        texts += [f"{place} 0 0 1", *["0 0 0 0.5 0 0 0"] * 5]
+        texts += [
+            f"{x} {y} {z} {index / 1024} {index % 256} 3 9" for index, (x, y, z) in enumerate(cloud()[rows].tolist())
+        ]
+    write_rows(path, texts)
+
+
 WRITERS = {
     "a.las": write_las,
     "a.laz": write_las,
@@ -118,6 +131,8 @@ WRITERS = {
     "a.txt": write_nameless,
     "b.csv": write_survey,
     "a.pts": write_scans,
+    "a.ptx": write_ptx,
+    "ptx.txt": write_ptx,
     "a.obj": write_obj,
     "a.npy": lambda path: np.save(path, cloud().astype(">f8")),
     "b.npy": write_columnwise,
@@ -126,7 +141,7 @@ WRITERS = {
 }
 
 
-_UNEVEN = ("a.las", "a.laz", "a.copc.laz", "a.e57")  # withheld points, and scans
+_UNEVEN = ("a.las", "a.laz", "a.copc.laz", "a.e57", "a.ptx", "ptx.txt")  # withheld points, and scans
 
 
 @pytest.mark.parametrize("size", [1, 100, 256, 10_000])
@@ -278,6 +293,9 @@ def test_numbers_that_some_files_lack(tmp_path):
     table = join_pieces(pieces, tmp_path / "tiles")
     assert table.attributes["wave"].tolist() == [1.0, 1.0, 0.0, 0.0, 0.0]
     assert table.notices[0] == "tiles: 3 points have no wave; it is 0 there."
+    colors = {"red": np.array([200.0, 0.0]), "green": np.ones(2), "blue": np.zeros(2)}
+    table = join_pieces([(np.zeros((2, 3)), colors), (np.ones((1, 3)), {})], tmp_path)
+    np.testing.assert_allclose(table.colors, np.array([[200, 1, 0, 255], [0, 1, 0, 255], [255] * 4]) / 255.0)
     colors = {name: np.full(2, 100, np.uint8) for name in ("red", "green", "blue")}
     table = join_pieces([(np.zeros((2, 3)), colors), (np.ones((1, 3)), {})], tmp_path)
     np.testing.assert_allclose(table.colors[:, 0], [100 / 255, 100 / 255, 1.0])
