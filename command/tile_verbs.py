@@ -54,6 +54,11 @@ class _Cutting(_TileVerb):
         for setting in _SETTINGS:
             add_setting(parser, setting)
         add_choices(parser)
+        corners = [f"{axis}{end}" for end in (1, 2) for axis in "XYZ"]
+        parser.add_argument(
+            "--bounds", type=float, nargs=6, metavar=tuple(corners), help="lowest and highest corner of a box to read"
+        )
+        parser.add_argument("--level", type=int, metavar="INT", help="last level of detail of COPC files to read")
 
     def expand(self, path, arguments):
         return all_files_in(path) if path.is_dir() else [path]
@@ -76,7 +81,7 @@ class _Cutting(_TileVerb):
         folder, memory = arguments.folder / STORE, arguments.memory or core.tiles.memory_of_worker(count)
         known = {
             "sources": [str(path.resolve()) for path in arguments.sources],
-            "read": {name: getattr(arguments, name) for name in ("classes", "withheld", "columns")},
+            "read": {name: getattr(arguments, name) for name in ("classes", "withheld", "columns", "bounds", "level")},
         }
         if folder.exists():
             store = core.tiles.Store(folder)
@@ -87,7 +92,9 @@ class _Cutting(_TileVerb):
             return store, _notices(store)
         halo = core.tiles.halo_of(options)
         most = arguments.tile_points or core.tiles.points_of_tile(memory, options, halo)
-        sources = tile_work.Sources(arguments.sources, las_choices(arguments), arguments.columns)
+        sources = tile_work.Sources(
+            arguments.sources, las_choices(arguments), arguments.columns, arguments.bounds, arguments.level
+        )
         while True:
             try:
                 store = _cut(sources, folder, most, options, halo, memory, known, progress)

@@ -24,6 +24,10 @@ class Sources:
     las : LasChoices
     columns : str
         Names of those of files of text; empty to find them.
+    bounds : sequence of float, optional
+        Lowest and highest corner of the box that is read, six numbers.
+    level : int, optional
+        The last level of detail that is read; files that have none are broken then.
 
     Attributes
     ----------
@@ -35,8 +39,13 @@ class Sources:
         The files that cannot be read, and why. They are left out.
     """
 
-    def __init__(self, paths, las, columns=""):
-        self._las, self._columns = las, columns
+    def __init__(self, paths, las, columns="", bounds=None, level=None):
+        self._columns = columns
+        self._choices = {
+            "las": las,
+            "bounds": None if bounds is None else np.reshape(bounds, (2, 3)),
+            "level": level,
+        }
         self._sizes = {path: path.stat().st_size if path.is_file() else 0 for path in paths}
         self._counts = {}  # of points, as far as known
         self.notices, self.full, self.broken = [], 0.0, {}
@@ -89,7 +98,7 @@ class Sources:
     def _pieces(self, path):
         """Yield the points of a file, and note what is to be told of it."""
         is_text, is_scan = (path.suffix.lower() in kinds for kinds in (core.files.TEXTS, core.files.SCANS))
-        pieces = core.files.chunks(path, _PIECE, las=self._las, columns=self._columns if is_text else "")
+        pieces = core.files.chunks(path, _PIECE, columns=self._columns if is_text else "", **self._choices)
         if is_scan:
             self._counts[path] = max(core.files.extent(path).count, 1)
         corners = []

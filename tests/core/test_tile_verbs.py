@@ -11,6 +11,7 @@ from command import tile_work, verbs
 from command.main import run as run_command
 from command.stages import ToldStages
 from core.files import PointTable, read_points, write_points
+from tests.core.copc_files import write_copc
 
 LENGTH, RADIUS, COUNT = 10.0, 0.25, 2400
 OPTIONS = ("--tile-points", 1300)
@@ -269,3 +270,23 @@ def test_sizes(text, size):
 def test_no_sizes(text):
     with pytest.raises(ValueError, match="size"):
         tile_work.bytes_of(text)
+
+
+def test_a_box_and_a_level_are_cut(run, scans, tmp_path):
+    low, high = [2.0, -1.0, -1.0], [8.0, 1.0, 1.0]
+    box = ("--bounds", *low, *high, "--tile-points", 1000)
+    code, [line] = run("tiles", "cut", scans, "--out-dir", tmp_path / "box", *box)
+    points = np.concatenate([read_points(scans / f"{name}.ply").points for name in "ab"])
+    assert (code, line["points"]) == (0, np.count_nonzero(np.all((points >= low) & (points <= high), axis=1)))
+    code, [line] = run("tiles", "cut", scans, "--out-dir", tmp_path / "box", "--tile-points", 1000)
+    assert (code, "other files or settings" in line["error"]) == (1, True)
+    code, [line] = run("tiles", "cut", scans, "--out-dir", tmp_path / "level", "--level", 0)
+    assert (code, "no levels of detail" in line["error"]) == (1, True)
+    write_copc(tmp_path / "octree.copc.laz", points)
+    counts = []
+    for level in (0, 1):
+        code, [line] = run(
+            "tiles", "cut", tmp_path / "octree.copc.laz", "--out-dir", tmp_path / str(level), "--level", level
+        )
+        counts.append(line["points"])
+    assert 0 < counts[0] < counts[1] < COUNT
