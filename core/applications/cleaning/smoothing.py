@@ -20,7 +20,8 @@ from .sizes import SurfaceSize, match_size
 _KEPT = (None, "area", "volume")
 _TOLERANCE = 1e-5  # of the factors: the coordinates are large next to the spacing
 _NOISE = 1.25  # mean squares of the smoothing lengths: time that removes the noise of single points
-_DETAIL = 9.0  # smoothing lengths of a wavelength below which details count as roughness
+DETAIL = 9.0  # smoothing lengths of a wavelength below which details count as roughness
+_EXACT = 1e-8  # error of roughness, as a share of the smoothing length, however large the cloud is against that
 _AROUND = 4  # neighbours along the boundary that a boundary point is joined to
 
 
@@ -227,7 +228,7 @@ def roughness(
         Its normals must agree in sign, as estimated ones do.
     wavelength : float, optional
         Wavelength [L] of which half counts as roughness: finer details count fully, wider ones as shape. If not given,
-        9 times the median smoothing length.
+        9 times the median smoothing length of the points that take part.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
@@ -259,11 +260,18 @@ def roughness(
     >>> print(np.argmax(np.abs(rough)), rough[400].round(2))
     400 0.02
     """
-    if wavelength is None:
-        wavelength = _DETAIL * float(np.median(laplacian.smoothing_lengths))
-    length = positive(wavelength, "wavelength of the roughness")
-    smooth = fair_points(laplacian, (length / (2.0 * np.pi)) ** 2, progress=progress)
-    return np.einsum("ij,ij->i", laplacian.points - smooth, laplacian.normals)
+    kept = laplacian.component >= 0
+    usual = float(np.median(laplacian.smoothing_lengths[kept]))
+    length = positive(DETAIL * usual if wavelength is None else wavelength, "wavelength of the roughness")
+    rest = laplacian.points - smoothing_base(laplacian)
+    smooth = chebyshev_filter(
+        laplacian,
+        rest,
+        fairing((length / (2.0 * np.pi)) ** 2),
+        tolerance=_EXACT * usual / float(np.abs(rest).max()),
+        progress=progress,
+    )
+    return np.einsum("ij,ij->i", rest - smooth, laplacian.normals)
 
 
 def displace_by_mode(
