@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from ..errors import InvalidPointsError, NotEnoughMemoryError, PointCloudError, TooFewPointsError
@@ -18,6 +19,8 @@ from ..memory import needed_memory
 from ..options import LaplacianOptions
 from ..types import Array, Floats
 from .cut import HALO, Plan, outside
+from .roughness import asked_wavelength
+from .seen import checked_viewpoint, orientation
 from .shelf import Record, Told
 from .site import Site
 from .steps import Step
@@ -39,6 +42,9 @@ def cut_to_store(
     *,
     halo: float = HALO,
     degree: int = DEGREE,
+    orient: str = "outside",
+    viewpoint: ArrayLike | None = None,
+    wavelength: float | None = None,
     memory: int | None = None,
     known: dict[str, Any] | None = None,
 ) -> Store:
@@ -59,6 +65,12 @@ def cut_to_store(
         See `cut`.
     degree : int
         See `survey`.
+    orient : {"outside", "up", "viewpoint"}
+        See `survey`.
+    viewpoint : array_like, (3,), optional
+        For 'viewpoint': one place [L]; else that of the column "scanner" at each point.
+    wavelength : float, optional
+        Of the roughness [L], see `core.roughness`; zero for the usual one. If not given, there is no roughness.
     memory : int, optional
         Bytes that a tile may take: larger ones are left out, with an error.
     known : dict, optional
@@ -71,7 +83,8 @@ def cut_to_store(
     Raises
     ------
     PointCloudError
-        The folder exists, or cannot be written; or there are no points, or chunks that differ when read again.
+        The folder exists, or cannot be written; there are no points, or chunks that differ when read again; another
+        orientation, or no viewpoint for it.
 
     Examples
     --------
@@ -88,14 +101,16 @@ def cut_to_store(
         raise PointCloudError(f"{folder} exists. Go on with it, or choose another folder.")
     if most < 1:
         raise InvalidPointsError(f"Tiles of {most} points were asked for. Ask for at least one.")
+    place, asked = checked_viewpoint(viewpoint), asked_wavelength(wavelength)
     counted = _count(chunks())
+    sides = orientation(orient, place, counted.columns)
     plan = Plan(counted.sample, -(-counted.count // most))
     building = folder.with_name(f".{folder.name}.part")
     try:
         shutil.rmtree(building, ignore_errors=True)  # of a cut that was killed
         building.mkdir(parents=True)
         sizes = _spread(chunks(), building, plan, counted)
-        agreed = {"center": counted.center, "scale": counted.scale, "degree": degree}
+        agreed = {"center": counted.center, "scale": counted.scale, "degree": degree, **sides, **asked}
         left_out = {"columns left out": counted.left_out, "halo": halo, "memory": memory}
         write_manifest(building, options, sizes, agreed, {**(known or {}), **left_out, "points": counted.count})
         os.replace(building, folder)

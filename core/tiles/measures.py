@@ -24,6 +24,8 @@ from ..types import Array, Floats, Ints
 from .labels import agree_on_signs, starts
 from .neighborhoods import Fitted, divided
 from .places import points_around
+from .roughness import agree_on_wavelength, tell_lengths, tell_roughness
+from .seen import signs_by_seen, tell_seen
 from .shelf import Record, Shelf, Told, visited
 from .site import Site
 
@@ -87,18 +89,24 @@ def agree_on_flips(shelf: Shelf, options: LaplacianOptions) -> Record:
 
 
 def tell_sides(site: Site, fitted: Fitted) -> tuple[None, Told]:
-    """Reverse patches, and sum up what tells the outer side of each component."""
+    """Reverse patches, and tell what decides the outer side of each component: sums, or what is seen."""
     record, sample = site.record, fitted.surface.sample
     begin = int(record["flip start"][site.number])
     side = site.told("patches", "normals") * record["flip"][begin + site.told("patches", "patches"), None]
     rows = np.flatnonzero(site.inner(sample.scaled))
-    names, label = np.unique(site.labels()[sample.scaled.first[rows]], return_inverse=True)
+    label = site.labels()[sample.scaled.first[rows]]
+    told = {"side": site.own(sample.scaled, side, 0.0)}
+    if record["orient"] != "outside":
+        return None, {**told, **tell_seen(site, sample, rows, side[rows], label)}
+    names, label = np.unique(label, return_inverse=True)
     sums = side_sums(sample.places[rows], side[rows], label.reshape(-1), np.ones(len(rows)))
-    return None, {"side": site.own(sample.scaled, side, 0.0), "name": names, "sums": sums}
+    return None, {**told, "name": names, "sums": sums}
 
 
 def agree_on_outside(shelf: Shelf, options: LaplacianOptions) -> Record:
     """Agree on the outer side of each component."""
+    if shelf.record["orient"] != "outside":
+        return {"outer": signs_by_seen(shelf, "outside")}
     return {"outer": signs_by_sums(_added(shelf, "outside", "sums"))}
 
 
@@ -116,13 +124,13 @@ def find_areas(site: Site, fitted: Fitted) -> tuple[Solved, Told]:
     names, label = np.unique(decisions.names(cloud.scaled, cloud.component)[inner], return_inverse=True)
     label = label.reshape(-1)
     sums = np.column_stack([np.bincount(label, values[inner], len(names)) for values in (cloud.cell_areas, areas)])
-    return Solved(cloud, areas), {"name": names, "sums": sums}
+    return Solved(cloud, areas), {"name": names, "sums": sums, **tell_lengths(site, cloud)}
 
 
 def agree_on_areas(shelf: Shelf, options: LaplacianOptions) -> Record:
-    """Agree on by how much the areas of each component are scaled."""
+    """Agree on by how much the areas of each component are scaled, and on the wavelength of the roughness."""
     total, found = _added(shelf, "areas", "sums").T
-    return {"ratio": total / np.where(found > 0.0, found, 1.0)}
+    return {"ratio": total / np.where(found > 0.0, found, 1.0), **agree_on_wavelength(shelf, "areas")}
 
 
 def share_weights(site: Site, state: object) -> tuple[None, Told]:
@@ -147,7 +155,7 @@ def measure(site: Site, solved: Solved) -> tuple[None, Told]:
     cloud = replace(cloud, decisions=decisions)
     laplacian = assemble_laplacian(site.part.points, cloud, solved.areas * site.record["ratio"][names], site.options)
     inner = site.part.inner
-    told = results(laplacian, site.labels(), np.flatnonzero(inner))
+    told = {**results(laplacian, site.labels(), np.flatnonzero(inner)), **tell_roughness(site, laplacian)}
     return None, {**told, "notices": np.array(laplacian.notices, dtype=str)}
 
 

@@ -57,6 +57,9 @@ class Shelf(Protocol):
     def own(self, number: int) -> Floats:
         """Return the points in the box of a tile."""
 
+    def columns(self, number: int) -> dict[str, Array]:
+        """Return what the input told of these points besides."""
+
     def read(self, step: str, number: int, name: str) -> Array:
         """Return what a step has told of a tile under a name."""
 
@@ -92,10 +95,14 @@ class Memory:
         What is agreed on from the start.
     last : str
         The step whose state is not kept.
+    columns : dict of str to ndarray, (n, ...)
+        What is told of the points besides.
     """
 
-    def __init__(self, points: Floats, tiles: Sequence[Tile], record: Record, last: str) -> None:
-        self.record = record
+    def __init__(
+        self, points: Floats, tiles: Sequence[Tile], record: Record, last: str, columns: dict[str, Array]
+    ) -> None:
+        self.record, self._columns = record, columns
         self._points, self._tiles, self._last = points, tiles, last
         self._owner, self._place = np.full((2, len(points)), -1)
         for number, tile in enumerate(tiles):
@@ -118,6 +125,10 @@ class Memory:
     def own(self, number: int) -> Floats:
         """Return the points in the box of a tile."""
         return self._points[self._tiles[number].own]
+
+    def columns(self, number: int) -> dict[str, Array]:
+        """Return what the input told of these points besides."""
+        return {name: values[self._tiles[number].own] for name, values in self._columns.items()}
 
     def read(self, step: str, number: int, name: str) -> Array:
         """Return what a step has told of a tile under a name."""

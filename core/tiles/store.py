@@ -19,7 +19,7 @@ from ..options import LaplacianOptions
 from ..types import Array, Floats
 from .shelf import Part, Record, Told, visited
 
-VERSION = 1
+VERSION = 2
 POINTS, COLUMNS = "points.npy", "columns.npy"
 _MANIFEST, _ERROR = "manifest.json", "error.json"
 _TRUSTED = ("numpy", "scipy", "builtins", "copyreg", __package__.rpartition(".")[0])  # packages of what states hold

@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..files import SCANNER
 from ..geometry import Agreed, check_points
 from ..options import LaplacianOptions, check_options
-from ..types import Progress
+from ..types import Array, Progress
 from .cut import Tile
+from .seen import checked_viewpoint, orientation
 from .shelf import Memory, Part
 from .site import Site
 from .steps import agree, part_of, survey_steps, visit
@@ -26,6 +28,8 @@ def survey(
     options: LaplacianOptions = LaplacianOptions(),
     *,
     degree: int = DEGREE,
+    orient: str = "outside",
+    viewpoint: ArrayLike | None = None,
     progress: Progress | None = None,
 ) -> Agreed:
     """Find what all tiles of a cloud must agree on.
@@ -41,6 +45,11 @@ def survey(
     degree : int
         Of the polynomials that solve for areas. A higher one asks for more of a halo: 24 for 60 spacings. An operator
         of all points at once has 100.
+    orient : {"outside", "up", "viewpoint"}
+        The side that normals are on: away from the middle of each component, or up where that is a sheet, as of
+        `estimate_normals`; the side that is seen from above; or that which is seen from a place.
+    viewpoint : array_like, (3,) or (n, 3), optional
+        For 'viewpoint': one place, or the place of the scanner for each point [L].
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
@@ -51,6 +60,8 @@ def survey(
 
     Raises
     ------
+    InvalidPointsError
+        Another orientation, or a viewpoint that is missing, or does not fit.
     PointCloudError
         The points, or those of a tile, have no sound neighbourhoods; see `build_laplacian`.
 
@@ -71,7 +82,12 @@ def survey(
     points = check_points(points)
     center = points.mean(axis=0)
     scale = np.sqrt(np.mean(np.sum((points - center) ** 2, axis=1)))
-    shelf = Memory(points, tiles, {"center": center, "scale": scale, "degree": np.array(degree)}, last="areas")
+    seen_from, columns = checked_viewpoint(viewpoint, len(points)), dict[str, Array]()
+    if seen_from is not None and seen_from.ndim == 2:
+        columns, seen_from = {SCANNER: seen_from}, None
+    sides = orientation(orient, seen_from, columns)
+    record = {"center": center, "scale": scale, "degree": np.array(degree), **sides}
+    shelf = Memory(points, tiles, record, "areas", columns)
     report = progress or (lambda stage, fraction: None)
     steps = survey_steps(options)
     for step in steps:

@@ -124,7 +124,7 @@ BELOW = {  # what each wing of core may use
     "operator": GROUND | {"algebra", "geometry"},
     "applications": GROUND | {"algebra", "geometry", "operator"},
     "paper": GROUND | {"algebra", "geometry", "operator"},
-    "tiles": GROUND | {"files", "geometry", "operator"},
+    "tiles": GROUND | {"applications", "files", "geometry", "operator"},
     "files": GROUND,
     "splats": GROUND | {"algebra", "files"},
 }

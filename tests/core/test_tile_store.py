@@ -30,15 +30,15 @@ def rod():
     return points + 0.15 * spacing * rng.normal(size=points.shape)
 
 
-def stored(folder, points, most, pieces=3, **columns):
+def stored(folder, points, most, pieces=3, **choice):
     """Cut points into a store, read in several pieces."""
     parts = np.array_split(np.arange(len(points)), pieces)
-    columns = {"row": np.arange(len(points)), **columns}
+    columns = {"row": np.arange(len(points))}
 
     def chunks():
         return ((points[part], {name: values[part] for name, values in columns.items()}) for part in parts)
 
-    return core.tiles.cut_to_store(chunks, folder / "store", most, halo=HALO, degree=DEGREE)
+    return core.tiles.cut_to_store(chunks, folder / "store", most, halo=HALO, degree=DEGREE, **choice)
 
 
 def joined(store, name):
@@ -51,7 +51,7 @@ def joined(store, name):
 @pytest.fixture(scope="module")
 def walk(tmp_path_factory):
     """A store after all steps, and what was told of the progress."""
-    store, told = stored(tmp_path_factory.mktemp("tiles"), rod(), 800), []
+    store, told = stored(tmp_path_factory.mktemp("tiles"), rod(), 800, wavelength=0.0), []
     core.tiles.run_steps(store, progress=lambda *given: told.append(given))
     return store, told
 
@@ -86,6 +86,7 @@ class TestStore:
         other = stored(tmp_path, rod()[order], 1100, pieces=1)
         core.tiles.run_steps(other)
         assert other.count == 3
+        assert core.tiles.ROUGHNESS not in other.names("measure", 0)  # which was not asked for
         for name in ("normals", "areas", "mean_curvature"):
             same(joined(other, name), joined(measured, name)[order])
 
@@ -98,6 +99,16 @@ class TestStore:
         assert len(found) == 1 + 4  # at the start, and after each tile
         np.testing.assert_allclose(np.diff(found), np.ptp(found) / 4)
         assert stages[-1] == "Operator"
+
+    def test_gives_the_roughness_of_the_whole(self, measured):
+        length = float(np.median(whole().smoothing_lengths))
+        assert abs(measured.record["wavelength"] / (9.0 * length) - 1.0) < 1e-9
+        same(joined(measured, core.tiles.ROUGHNESS), core.roughness(whole()), 1e-6)
+        assert core.tiles.doubted_wavelength(measured.record, HALO) is None
+        longer = {**measured.record, "wavelength": np.array(40.0 * length)}
+        wavelength, share = core.tiles.doubted_wavelength(longer, HALO)
+        assert wavelength == 40.0 * length
+        assert 0.01 < share < 1.0
 
     def test_keeps_no_states_and_no_parts_at_the_end(self, measured):
         names = {path.name.partition(".")[0] for path in measured.folder.rglob("*")}

@@ -1,0 +1,93 @@
+"""The side of normals in tiles: outside, up, or as seen from a place, whatever the cut."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import core
+from benchmarks.samplings import fibonacci_sphere
+
+COUNT = 900
+SPHERE = fibonacci_sphere(COUNT)
+
+
+@cache
+def sheet():
+    """Return points of a wavy sheet, about as high as it is wide, (n, 3)."""
+    x, y = np.random.default_rng(0).uniform(-1.0, 1.0, (2, COUNT))
+    return np.column_stack([x, y, 0.3 * np.cos(2.0 * x)])
+
+
+def sides(points, count, **choice):
+    tiles = core.tiles.cut(points, count, 20.0)
+    return core.tiles.survey(points, tiles, degree=12, **choice).side
+
+
+SPHERES = {
+    "up": ({}, 1.0),
+    "from without": ({"viewpoint": [3.0, 0.0, 0.5]}, 1.0),
+    "from within": ({"viewpoint": [0.2, 0.1, 0.5]}, -1.0),
+    "by scanners within": ({"viewpoint": 0.5 * SPHERE[::-1]}, -1.0),
+    "by scanners without": ({"viewpoint": 2.0 * SPHERE}, 1.0),
+}
+
+
+@pytest.mark.parametrize("case", SPHERES)
+def test_of_a_closed_body_is_what_is_seen_of_it(case):
+    choice, sign = SPHERES[case]
+    found = sides(SPHERE, 2, orient="viewpoint" if choice else "up", **choice)
+    assert np.all(sign * np.einsum("ij,ij->i", found, SPHERE) > 0.9)
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_of_a_sheet_is_that_of_the_place(count):
+    for place, sign in (([0.0, 0.0, 5.0], 1.0), ([0.5, 0.2, -0.7], -1.0)):
+        assert np.all(sign * sides(sheet(), count, orient="viewpoint", viewpoint=place)[:, 2] > 0.0)
+    turned = sheet() * [1.0, 1.0, -1.0]
+    assert np.all(sides(turned, count, orient="up")[:, 2] > 0.0)
+
+
+def test_of_bodies_is_decided_one_by_one():
+    """A small sphere in the shadow of a large one has its own outer side."""
+    points = np.concatenate([SPHERE, 0.4 * SPHERE[::2] + [0.0, 0.0, -3.0]])
+    found = sides(points, 2, orient="up")
+    center = np.where(np.arange(len(points)) < COUNT, 0.0, -3.0)
+    outward = points - center[:, None] * [0.0, 0.0, 1.0]
+    assert np.all(np.einsum("ij,ij->i", found, outward) > 0.0)
+
+
+def stored(folder, pieces, **choice):
+    return core.tiles.cut_to_store(lambda: pieces, folder / "store", 500, degree=12, halo=20.0, **choice)
+
+
+def test_by_scanners_is_told_by_the_files(tmp_path):
+    halves = [(SPHERE[rows], {"scanner": 0.1 * SPHERE[rows]}) for rows in (slice(400), slice(400, None))]
+    store = stored(tmp_path, halves, orient="viewpoint")
+    core.tiles.run_steps(store)
+    for number in store.alive:
+        inward = -np.einsum("ij,ij->i", store.read("measure", number, "normals"), store.own(number))
+        assert np.all(inward > 0.9)
+        np.testing.assert_allclose(store.read("measure", number, "mean_curvature"), -1.0, atol=0.02)
+
+
+def test_without_a_scanner_is_told_before_anything_is_cut(tmp_path):
+    halves = [(SPHERE[:400], {"scanner": SPHERE[:400]}), (SPHERE[400:], {})]
+    with pytest.raises(core.InvalidPointsError, match="not all points tell where their scanner was.*Give a viewpoint"):
+        stored(tmp_path, halves, orient="viewpoint")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("choice", "text"),
+    [
+        ({"orient": "sideways"}, "unknown"),
+        ({"viewpoint": [0.0, 0.0, 1.0]}, "does not go with"),
+        ({"orient": "viewpoint"}, "No viewpoint"),
+        ({"orient": "viewpoint", "viewpoint": [0.0, np.nan, 1.0]}, "not finite"),
+        ({"orient": "viewpoint", "viewpoint": np.zeros((COUNT - 1, 3))}, "one for each of"),
+    ],
+)
+def test_that_cannot_be_is_refused(choice, text):
+    with pytest.raises(core.InvalidPointsError, match=text):
+        sides(SPHERE, 1, **choice)
