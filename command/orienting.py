@@ -3,7 +3,7 @@
 import numpy as np
 
 from . import core
-from .settings import Setting
+from .settings import Setting, place
 
 ORIENT = {
     setting.name: setting
@@ -20,6 +20,17 @@ ORIENT = {
     )
 }
 _METHODS = {"WINDING": "winding", "OUTSIDE": "outside"}  # in core; others are by viewpoints
+
+
+def add_viewpoint(parser, implied):
+    """Add the option for a viewpoint; `implied` is what it sets, for the help."""
+    parser.add_argument(
+        "--viewpoint",
+        type=place,
+        metavar="X,Y,Z",
+        help="position in the coordinates of the file from which the points were seen, as --viewpoint=X,Y,Z where X"
+        f" is below zero. Sets {implied}",
+    )
 
 
 def imply_method(parser, arguments):

@@ -9,7 +9,7 @@ from .cloud_verb import SurfaceVerb, floaters
 from .groups import read_weights
 from .quantities import NORMAL, ORIENTATION, rows_of
 from .results import Told, number_text
-from .settings import LAPLACIAN, chosen, place
+from .settings import LAPLACIAN, chosen
 
 
 class ResultVerb(SurfaceVerb):
@@ -150,13 +150,7 @@ class Orient(ResultVerb):
     settings = tuple(orienting.ORIENT.values())
 
     def add_options(self, parser):
-        parser.add_argument(
-            "--viewpoint",
-            type=place,
-            metavar="X,Y,Z",
-            help="position in the coordinates of the file from which the points were seen, as --viewpoint=X,Y,Z where X"
-            " is below zero. Sets the method VIEWPOINT",
-        )
+        orienting.add_viewpoint(parser, "the method VIEWPOINT")
         super().add_options(parser)
 
     def check(self, parser, arguments):

@@ -6,7 +6,7 @@ import time
 from dataclasses import fields
 from pathlib import Path
 
-from . import core, tile_work
+from . import core, tile_choices, tile_work
 from .inputs import add_choices, all_files_in, las_choices, parse_share
 from .records import SUFFIX
 from .rows import TABLES, write_rows, write_text
@@ -16,7 +16,6 @@ from .tile_work import STORE
 from .verb import ONE_LINE, Verb
 
 _SETTINGS = [LAPLACIAN[field.name] for field in fields(core.LaplacianOptions)]
-_FORMATS = (".ply", ".laz", ".las", ".csv", ".xyz", ".npy")
 _EACH = 0.01  # of the work is told
 _READ, _WRITTEN = 0.02, 0.02  # shares of a run that reading and writing files take about
 _REPORT = f"tiles{SUFFIX}"  # in the folder of a run
@@ -53,6 +52,7 @@ class _Cutting(_TileVerb):
         parser.add_argument("--tile-points", type=int, metavar="INT", help="points of a tile; else by the memory")
         for setting in _SETTINGS:
             add_setting(parser, setting)
+        tile_choices.add_measures(parser)
         add_choices(parser)
         corners = [f"{axis}{end}" for end in (1, 2) for axis in "XYZ"]
         parser.add_argument(
@@ -70,6 +70,7 @@ class _Cutting(_TileVerb):
             parser.error("--tile-points must be at least 1")
         if arguments.columns and not any(path.suffix.lower() in core.files.TEXTS for path in arguments.inputs):
             parser.error(f"--columns is for files of text, {', '.join(core.files.TEXTS)}")
+        tile_choices.check_measures(parser, arguments)
         arguments.sources, arguments.inputs = arguments.inputs, [arguments.folder]
 
     def cut(self, arguments, count, progress):
@@ -83,9 +84,11 @@ class _Cutting(_TileVerb):
             "sources": [str(path.resolve()) for path in arguments.sources],
             "read": {name: getattr(arguments, name) for name in ("classes", "withheld", "columns", "bounds", "level")},
         }
+        measures = tile_choices.measures(arguments)
         if folder.exists():
             store = core.tiles.Store(folder)
-            if ({name: store.manifest.get(name) for name in known}, store.options) != (known, options):
+            same = {name: store.manifest["agreed"].get(name) for name in measures} == measures
+            if not same or ({name: store.manifest.get(name) for name in known}, store.options) != (known, options):
                 raise core.PointCloudError(
                     f"{arguments.folder} has tiles of other files or settings. Choose another folder, or delete it."
                 )
@@ -97,7 +100,7 @@ class _Cutting(_TileVerb):
         )
         while True:
             try:
-                store = _cut(sources, folder, most, options, halo, memory, known, progress)
+                store = _cut(sources, folder, most, options, halo, memory, known, measures, progress)
             except tile_work.Incomplete:
                 continue  # without the file that broke off
             return store, _notices(store)
@@ -110,7 +113,7 @@ def _notices(store):
     return [*store.manifest["notices"], *missing]
 
 
-def _cut(sources, folder, most, options, halo, memory, known, progress):
+def _cut(sources, folder, most, options, halo, memory, known, measures, progress):
     begin = 0.0
 
     def chunks():
@@ -121,7 +124,7 @@ def _cut(sources, folder, most, options, halo, memory, known, progress):
         known.update({"full color": sources.full, "notices": sources.notices, "broken": broken})
 
     progress("Read", 0.0)
-    return core.tiles.cut_to_store(chunks, folder, most, options, halo=halo, memory=memory, known=known)
+    return core.tiles.cut_to_store(chunks, folder, most, options, halo=halo, memory=memory, known=known, **measures)
 
 
 class TilesRun(_Cutting):
@@ -135,12 +138,14 @@ class TilesRun(_Cutting):
         _add_modes(parser, 0)
         parser.add_argument("--workers", type=int, default=1, metavar="INT", help="processes on this machine")
         parser.add_argument("--scheduler", default="", metavar="ADDRESS", help="of a Dask cluster that does the work")
-        _add_format(parser)
+        tile_choices.add_files_of_tiles(parser)
+        tile_choices.add_one_file(parser)
 
     def check(self, parser, arguments):
         super().check(parser, arguments)
         if arguments.workers < 1:
             parser.error("--workers must be at least 1")
+        tile_choices.check_one_file(parser, arguments, arguments.sources)
         _check_modes(parser, arguments, 0)
 
     def run(self, path, arguments, output):
@@ -155,8 +160,8 @@ class TilesRun(_Cutting):
 
                 core.tiles.run_steps(store, visit_all, _share(stages, _READ, 1.0 - _WRITTEN))
                 written = _share(stages, 1.0 - _WRITTEN, 1.0)
-                _write(store, path, store.alive, arguments.tile_format, spread, written)
-        return {**_report(store, path, arguments.tile_format), "notices": notices}
+                _write(store, path, store.alive, arguments, spread, written)
+        return {**_report(store, path, arguments), "notices": [*notices, *_finish(store, arguments)]}
 
 
 class TilesCut(_Cutting):
@@ -236,7 +241,7 @@ class TilesMeasure(_Stage):
 
     def add_options(self, parser):
         _add_share(parser)
-        _add_format(parser)
+        tile_choices.add_files_of_tiles(parser)
 
     def run(self, path, arguments, output):
         store = self.store(path)
@@ -249,7 +254,7 @@ class TilesMeasure(_Stage):
         number, count = arguments.tiles
         measured = [tile for tile in store.alive if store.done("measure", tile)]
         mine = [tile for tile in measured if tile % count == number - 1]
-        _write(store, path, mine, arguments.tile_format, lambda function, many: (function(*given) for given in many))
+        _write(store, path, mine, arguments, lambda function, many: (function(*given) for given in many))
         return {**found, "notices": []}
 
 
@@ -285,17 +290,24 @@ class TilesReport(_Stage):
     outputs = TABLES
 
     def add_options(self, parser):
-        _add_format(parser, "--tile-format")
+        tile_choices.add_files_of_tiles(parser, "--tile-format")
+        tile_choices.add_one_file(parser)
+
+    def check(self, parser, arguments):
+        super().check(parser, arguments)
+        if arguments.one_file is not None and len(arguments.inputs) > 1:
+            parser.error("--one-file takes one folder of tiles")
+        tile_choices.check_one_file(parser, arguments, [])
 
     def run(self, path, arguments, output):
         store = self.store(path)
-        found = _report(store, path, arguments.tile_format)
+        found = _report(store, path, arguments)
         if output is not None:
-            rows = tile_work.tile_records(store, path, _suffix(arguments.tile_format))
+            rows = tile_work.tile_records(store, path, tile_choices.ending(arguments))
             rows += tile_work.file_records(store)
             names = ("tile", "file", "points", "total_area", "elapsed", "error")
             write_rows(output, [{name: row.get(name) for name in names} for row in rows])
-        return {**found, "notices": []}
+        return {**found, "notices": _finish(store, arguments)}
 
 
 def _share(progress, begin, end):
@@ -303,20 +315,32 @@ def _share(progress, begin, end):
     return lambda stage, fraction: progress(stage, begin + (end - begin) * fraction)
 
 
-def _write(store, folder, numbers, form, spread, progress=lambda stage, fraction: None):
+def _write(store, folder, numbers, arguments, spread, progress=lambda stage, fraction: None):
     """Write the results of some tiles."""
-    suffix = _suffix(form)
+    suffix = tile_choices.ending(arguments)
     if not suffix:
         return
-    many = [(str(store.folder), number, str(tile_work.tile_path(folder, number, suffix))) for number in numbers]
+    paths = [str(tile_work.tile_path(folder, number, suffix)) for number in numbers]
+    many = [(str(store.folder), number, path, arguments.smoothed) for number, path in zip(numbers, paths, strict=True)]
     progress("Write", 0.0)
     for done, _ in enumerate(spread(tile_work.write_tile, many), 1):
         progress("Write", done / len(many))
 
 
-def _report(store, folder, form):
+def _finish(store, arguments):
+    """Write one file of all results, if that is asked for, and return what is to be told of the results."""
+    notices = tile_work.doubts(store)
+    if arguments.one_file is not None:
+        notices += tile_work.write_one(store, arguments.one_file, arguments.smoothed)
+    return notices
+
+
+def _report(store, folder, arguments):
     """Write the report of all tiles, a line of JSON for each, and return the totals with the errors."""
-    records, files = tile_work.tile_records(store, folder, _suffix(form)), tile_work.file_records(store)
+    records, files = (
+        tile_work.tile_records(store, folder, tile_choices.ending(arguments)),
+        tile_work.file_records(store),
+    )
     shared = {"verb": "tiles run", "settings": store.manifest["options"], "stamps": {}, "ended": round(time.time(), 3)}
     lines = [{"path": record["file"], **shared, **record} for record in [*files, *records]]
     write_text(folder / _REPORT, "".join(f"{json.dumps(line)}\n" for line in lines))
@@ -324,11 +348,6 @@ def _report(store, folder, form):
     errors += [{"tile": record["tile"], "error": record["error"]} for record in records if "error" in record]
     modes = {"eigenvalues": tile_work.eigenvalues(store)} if store.agreed_after("spectrum") else {}
     return {**tile_work.totals(store, records), **modes, "failed_files": len(files), "errors": errors}
-
-
-def _suffix(form):
-    """Return the ending of results in files; none where they stay in the store as .npz."""
-    return "" if form == "npy" else f".{form}"
 
 
 def _add_modes(parser, default):
@@ -356,17 +375,6 @@ def _add_share(parser):
         default=(1, 1),
         metavar="K/N",
         help="take the K-th of N equal shares of the tiles only",
-    )
-
-
-def _add_format(parser, name="--format"):
-    endings = [suffix[1:] for suffix in _FORMATS]
-    parser.add_argument(
-        name,
-        dest="tile_format",
-        choices=endings,
-        default=endings[0],
-        help="results of each tile; npy leaves them in the store only, where they are as arrays in any case",
     )
 
 

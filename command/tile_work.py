@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from . import clouds, core
-from .quantities import eigenvector_name, rows_of
+from .quantities import ROUGHNESS, eigenvector_name, rows_of
 
 STORE = "store"  # the folder within that of a run
 _PIECE = 1_000_000  # points that are read at once
@@ -122,22 +122,26 @@ def tile_path(folder, number, suffix):
     return Path(folder) / f"tile_{number:06d}{suffix}"
 
 
-def write_tile(store, number, path):
+def write_tile(store, number, path, smoothed):
     """Write the results of a tile, with the columns of its points, unless that is done; return its number."""
     path, store = Path(path), core.tiles.Store(store)
-    if path.exists() and path.stat().st_mtime_ns >= store.changed(number, ("measure", "modes")):
-        return number
-    table = _table(store, number)
-    if path.suffix.lower() not in core.files.LASER_FILES:
-        core.files.write_points(path, table)
-        return number
-    with core.files.replacing(path) as part:
-        core.files.write_las(part, table)
+    if not path.exists() or path.stat().st_mtime_ns < store.changed(number, ("measure", "modes")):
+        core.files.write_pieces(path, lambda: [_table(store, number, smoothed)])
     return number
 
 
-def _table(store, number):
-    """Return the points of a tile, with their columns and results."""
+def write_one(store, path, smoothed):
+    """Write the results of all tiles that could be measured to one file, and return notices."""
+    waiting = core.tiles.pending(store)
+    if waiting is not None:
+        raise core.PointCloudError(
+            f"The tiles wait for the step {waiting[0].name}. Take all steps before {path.name} is written."
+        )
+    return core.files.write_pieces(path, lambda: (_table(store, number, smoothed) for number in store.alive))
+
+
+def _table(store, number, smoothed):
+    """Return the points of a tile, as they were read or where they are on the surface, with columns and results."""
     found = {name: store.read("measure", number, name) for name in store.names("measure", number)}
     results = SimpleNamespace(laplacian=SimpleNamespace(**found), mean_curvature=found["mean_curvature"])
     columns, colors = store.columns(number), None
@@ -146,10 +150,25 @@ def _table(store, number):
         alpha = channels[3] if len(channels) > 3 else None
         colors = core.files.unit_colors(np.stack(channels[:3], axis=1), alpha, store.manifest["full color"])
     measures = {row.attribute: row.of(results) for row in rows_of("analyze")}
+    if core.tiles.ROUGHNESS in found:
+        measures[ROUGHNESS] = found[core.tiles.ROUGHNESS]
     if store.done("modes", number):
         vectors = store.read("modes", number, "modes").T
         measures |= {eigenvector_name(place): vector for place, vector in enumerate(vectors, 1)}
-    return clouds.with_results(core.files.PointTable(store.own(number), columns, colors), measures)
+    points = found["surface_points"] if smoothed else store.own(number)
+    return clouds.with_results(core.files.PointTable(points, columns, colors), measures)
+
+
+def doubts(store):
+    """Return notices on what halos are too narrow for."""
+    found = core.tiles.doubted_wavelength(store.record, store.manifest["halo"])
+    if found is None:
+        return []
+    wavelength, share = found
+    return [
+        f"The wavelength {wavelength:.4g} is long against the halos of {store.manifest['halo']:g} spacings: next to the"
+        f" borders of tiles, roughness may be off by {share:.1%} of the smoothing. Use a shorter one."
+    ]
 
 
 @contextlib.contextmanager

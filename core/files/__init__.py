@@ -11,11 +11,11 @@ from .formats import (
     precision_notices,
     read_points,
     reading,
+    write_pieces,
     write_points,
 )
 from .frames import frame_number, numbered_files, order_frames
 from .las_choices import LasChoices, parse_classes
-from .las_writing import LASER_FILES, write_las
 from .lines import brief
 from .mesh import MESHES, write_mesh
 from .origin import choose_origin, is_coarse

@@ -4,7 +4,7 @@ import os
 import struct
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -16,12 +16,14 @@ from .arrays import read_array
 from .e57 import read_e57
 from .las import read_las
 from .las_choices import LasChoices
+from .las_writing import write_las
 from .lines import brief
 from .origin import look_like_degrees
 from .pcd import read_pcd
-from .ply import read_ply, write_ply
+from .ply import read_ply, write_vertex_pieces
 from .ptx import read_ptx
-from .table import PointTable, check_places, without_missed
+from .ranges import ColumnPieces
+from .table import PointTable, check_places, to_columns, without_missed
 from .text import read_columns, read_scan, read_vertices, write_columns
 from .whole import replacing
 
@@ -167,11 +169,51 @@ def write_points(path: Path, table: PointTable, double: bool = True) -> list[str
     list of str
         Notices of differences between what was given and what is written.
     """
+    columns = to_columns(table, double)
+    return _write(path, lambda: [columns], WRITABLE)
+
+
+def write_pieces(path: Path, tables: Callable[[], Iterable[PointTable]]) -> list[str]:
+    """Write tables one after the other to a file of one of the kinds in `WRITABLE` or `SCANS`.
+
+    Memory is that of one of them. An older file stays if it fails.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+    tables : callable
+        Returns an iterable of tables with the same attributes, the same each time: they are looked at twice, once for
+        their number, ranges and types.
+
+    Returns
+    -------
+    list of str
+        Notices of differences between what was given and what is written.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import core
+    >>> from core.files import PointTable, read_points, write_pieces
+    >>> points = core.example_sphere()
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "sphere.ply")
+    ...     write_pieces(path, lambda: [PointTable(points[:500]), PointTable(points[500:])])
+    ...     print(len(read_points(path).points))
+    []
+    800
+    """
+    return _write(path, lambda: (to_columns(table) for table in tables()), (*WRITABLE, *SCANS))
+
+
+def _write(path: Path, pieces: ColumnPieces, kinds: Sequence[str]) -> list[str]:
     suffix = path.suffix.lower()
-    if suffix not in WRITABLE:
-        raise PointCloudError(f"Points cannot be written to {path}. Give it one of {', '.join(WRITABLE)}.")
+    if suffix not in kinds:
+        raise PointCloudError(f"Points cannot be written to {path}. Give it one of {', '.join(kinds)}.")
     with replacing(path) as temporary:
+        if suffix in SCANS:
+            return write_las(temporary, pieces, path.name)
         if suffix == ".ply":
-            return write_ply(temporary, table, double)
-        write_columns(temporary, table, "," if suffix == ".csv" else " ", double)
+            return write_vertex_pieces(temporary, pieces)
+        write_columns(temporary, pieces, "," if suffix == ".csv" else " ")
         return []

@@ -3,33 +3,36 @@
 import re
 from itertools import count
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..errors import PointCloudError
-from ..types import Array, Floats
-from .table import PointTable, to_columns
+from ..types import Floats
+from .ranges import ColumnPieces, Range, ranges_of
+from .table import AXES, CHANNELS
 
-LASER_FILES = (".las", ".laz")
 _KNOWN = {  # columns of every point, by the greatest number
     "intensity": 65535,
     "classification": 255,
     "return_number": 15,
     "gps_time": np.inf,
 }
-_COLORS = ("red", "green", "blue")
+_COLORS = CHANNELS[:3]
 _STEPS = 2.0**31  # that a coordinate has
 _NAME = 32  # bytes of a name
 _FINEST = -9  # power of ten of the finest step: coarser ones compress better
 
 
-def write_las(path: Path, table: PointTable) -> list[str]:
-    """Write a table to a LAS file of version 1.4, compressed if its name ends in .laz.
+def write_las(path: Path, pieces: ColumnPieces, name: str) -> list[str]:
+    """Write a LAS file of version 1.4, compressed if its name ends in .laz, piece by piece.
 
     Parameters
     ----------
     path : pathlib.Path
-    table : PointTable
+    pieces : callable
+    name : str
+        Of the file, for texts.
 
     Returns
     -------
@@ -46,58 +49,59 @@ def write_las(path: Path, table: PointTable) -> list[str]:
         import lazrs  # noqa: F401
     except ImportError as error:
         raise PointCloudError(
-            f"{path} cannot be written: {error.name} is missing. Install laspy and lazrs, or choose another format."
+            f"{name} cannot be written: {error.name} is missing. Install laspy and lazrs, or choose another format."
         ) from error
-    columns, notices = to_columns(table), list[str]()
-    for axis in ("x", "y", "z"):
-        del columns[axis]
-    colored = all(name in columns for name in _COLORS)
+    _, ranges = ranges_of(pieces)
+    corners = [ranges.pop(axis) for axis in AXES]
+    colored = all(color in ranges for color in _COLORS)
     header = laspy.LasHeader(point_format=7 if colored else 6, version="1.4")
-    low = table.points.min(axis=0) if len(table.points) else np.zeros(3)
-    header.offsets, header.scales = np.floor(low), np.full(3, _step(table.points))
-    las = laspy.LasData(header)
-    las.xyz = table.points
-    if colored:
-        for name in _COLORS:
-            las[name] = columns.pop(name).astype(np.uint16) * 257  # of eight bits to sixteen
-        columns.pop("alpha", None)
-    extra: dict[str, Array] = {}
-    for name, values in columns.items():
-        if name in _KNOWN and _fits(values, _KNOWN[name]):
-            las[name] = values
-        else:
-            short = _free(name, {*header.point_format.dimension_names, *extra})
-            if short != name:
-                notices.append(f"{path.name}: {name} is written as {short}: LAS has short names, and some of its own.")
-            extra[short] = _storable(values)
-    if extra:
-        las.add_extra_dims([laspy.ExtraBytesParams(name, values.dtype) for name, values in extra.items()])
-        for name, values in extra.items():
-            las[name] = values
-    las.write(str(path))
+    low, high = np.array([[corner.low, corner.high] for corner in corners], dtype=np.float64).T
+    header.offsets, header.scales = np.floor(low), np.full(3, _step(low, high))
+    left_out = CHANNELS if colored else ()  # of what becomes a column of its own
+    places, extra, notices = dict[str, str](), dict[str, Any](), list[str]()
+    for column, found in ranges.items():
+        if column in left_out:
+            continue
+        places[column] = column
+        if column not in _KNOWN or not _fits(found, _KNOWN[column]):
+            short = _free(column, {*header.point_format.dimension_names, *extra})
+            if short != column:
+                notices.append(f"{name}: {column} is written as {short}: LAS has short names, and some of its own.")
+            places[column], extra[short] = short, _storable(found)
+    header.add_extra_dims([laspy.ExtraBytesParams(short, kind) for short, kind in extra.items()])
+    for record in header.vlrs.get("ExtraBytesVlr"):
+        for item in record.extra_bytes_structs:  # laspy would state ranges, of the first point of each piece alone
+            item.options &= ~(item.MIN_BIT_MASK | item.MAX_BIT_MASK)
+    with laspy.open(str(path), mode="w", header=header) as file:
+        for columns in pieces():
+            points = laspy.ScaleAwarePointRecord.zeros(len(columns[AXES[0]]), header=header)
+            for axis in AXES:
+                points[axis] = columns[axis]
+            for color in _COLORS if colored else ():
+                points[color] = columns[color].astype(np.uint16) * 257  # of eight bits to sixteen
+            for column, place in places.items():
+                points[place] = columns[column].astype(extra.get(place, columns[column].dtype), copy=False)
+            file.write_points(points)
     return notices
 
 
-def _step(points: Floats) -> float:
+def _step(low: Floats, high: Floats) -> float:
     """Return the finest power of ten in which coordinates fit."""
-    if not len(points):
-        return 1e-3
-    extent = float((points.max(axis=0) - np.floor(points.min(axis=0))).max())
+    extent = float((high - np.floor(low)).max())
     return float(10.0 ** max(np.ceil(np.log10(max(extent, 1e-300) / _STEPS)), _FINEST))
 
 
-def _fits(values: Array, most: float) -> bool:
-    whole = most == np.inf or bool(np.all(values == np.round(values)))
-    return whole and bool(np.all((values >= 0) & (values <= most)))
+def _fits(found: Range, most: float) -> bool:
+    return (found.whole or most == np.inf) and found.low >= 0 and found.high <= most
 
 
-def _storable(values: Array) -> Array:
-    """Return numbers in a type that extra bytes have, and whole ones in no more bytes than they need."""
-    if values.dtype == bool:
-        return values.astype(np.uint8)
-    if values.dtype.kind in "iu" and len(values):
-        return values.astype(np.promote_types(np.min_scalar_type(values.min()), np.min_scalar_type(values.max())))
-    return values
+def _storable(found: Range) -> np.dtype[Any]:
+    """Return a type that extra bytes have, and for whole numbers one of no more bytes than they need."""
+    if found.dtype == bool:
+        return np.dtype(np.uint8)
+    if found.dtype.kind in "iu":
+        return np.promote_types(np.min_scalar_type(found.low), np.min_scalar_type(found.high))
+    return found.dtype
 
 
 def _free(name: str, taken: set[str]) -> str:

@@ -12,6 +12,7 @@ from .ascii_words import ascii_words
 from .lines import brief
 from .ply_lists import Code, end_of_records, read_fixed
 from .polygons import triangles
+from .ranges import ColumnPieces, Columns, Range, ranges_of
 from .rows import read_records, read_rows, record_blocks
 from .table import PointTable, from_columns, gather_columns, to_columns
 
@@ -254,25 +255,47 @@ def write_ply(path: Path, table: PointTable, double: bool = True, faces: Sequenc
     faces : sequence of ndarray, (m, k) int
         Of k corners each, as indices of points.
     """
-    columns = to_columns(table)
-    if not double:
-        columns.update((axis, columns[axis].astype(np.float32)) for axis in "xyz")
-    return write_vertex_columns(path, columns, faces=faces)
+    return write_vertex_columns(path, to_columns(table, double), faces=faces)
 
 
 def write_vertex_columns(
     path: Path,
-    columns: dict[str, Array],
+    columns: Columns,
     order: str = "<",
     comments: Sequence[str] = (),
     faces: Sequence[Ints] = (),
 ) -> list[str]:
-    """Write a binary PLY file.
+    """Write a binary PLY file of all vertices at once, and return notices; see `write_vertex_pieces`.
 
     Parameters
     ----------
     path : pathlib.Path
     columns : dict of str to ndarray, (n,)
+    order, comments
+        See there.
+    faces : sequence of ndarray, (m, k) int
+        Of at most 255 corners each, as indices of vertices. Those of several numbers of corners become triangles, since
+        some programs read no file with both.
+    """
+    polygons = [corners for corners in faces if len(corners)]
+    divided = polygons if len(polygons) < 2 else [_all_triangles(polygons, columns)]
+    notices = write_vertex_pieces(path, lambda: [columns], order, comments, divided)
+    if len(polygons) > 1:
+        notices.append(
+            "Quads were divided into triangles, since some programs read no PLY file with both. No point is lost."
+        )
+    return notices
+
+
+def write_vertex_pieces(
+    path: Path, pieces: ColumnPieces, order: str = "<", comments: Sequence[str] = (), faces: Sequence[Ints] = ()
+) -> list[str]:
+    """Write a binary PLY file, the vertices piece by piece.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+    pieces : callable
         Names become words of ASCII. PLY has no whole numbers of 8 bytes: those that no double can hold become two
         columns, the second of which counts 2**32.
     order : {"<", ">"}
@@ -280,70 +303,83 @@ def write_vertex_columns(
     comments : sequence of str
         Lines of the header.
     faces : sequence of ndarray, (m, k) int
-        Of at most 255 corners each, as indices of vertices. Those of several numbers of corners become triangles, since
-        some programs read no file with both.
+        Of the same number of corners, at most 255, as indices of vertices.
 
     Returns
     -------
     list of str
         Notices of differences between what was given and what is written.
     """
-    columns, notices = _with_types(columns)
-    names = dict(zip(columns, ascii_words(list(columns)), strict=True))
-    polygons = [corners for corners in faces if len(corners)]
-    faces = polygons if len(polygons) < 2 else [_all_triangles(polygons, columns)]
-    count = len(next(iter(columns.values())))
-    rows = np.empty(count, [(names[name], order + values.dtype.str[1:]) for name, values in columns.items()])
-    for name, values in columns.items():
-        rows[names[name]] = values
+    count, ranges = ranges_of(pieces)
+    properties, notices = _properties(ranges)
+    names = dict(zip(properties, ascii_words(list(properties)), strict=True))
+    record = np.dtype([(names[name], order + item.code) for name, item in properties.items()])
     kind = next(name for name, known in _ORDERS.items() if known == order)
     lines = ["ply", f"format {kind} 1.0", *comments, f"element vertex {count}"]
-    lines += [f"property {_NAMES[values.dtype.str[1:]]} {names[name]}" for name, values in columns.items()]
+    lines += [f"property {_NAMES[item.code]} {names[name]}" for name, item in properties.items()]
     if len(faces):
         lines += [f"element face {sum(map(len, faces))}", "property list uchar int vertex_indices"]
     with open(path, "wb") as file:
         file.write("\n".join([*lines, "end_header\n"]).encode())
-        rows.tofile(file)
+        for columns in pieces():
+            rows = np.empty(len(next(iter(columns.values()))), record)
+            for name, item in properties.items():
+                rows[names[name]] = item.of(columns)
+            rows.tofile(file)
         for corners in faces:
             lists = np.empty(len(corners), [("count", "u1"), ("corners", order + "i4", corners.shape[1])])
             lists["count"], lists["corners"] = corners.shape[1], corners
             lists.tofile(file)
-    if len(polygons) > 1:
-        notices.append(
-            "Quads were divided into triangles, since some programs read no PLY file with both. No point is lost."
-        )
     renamed = ", ".join(f"{name} as {word}" for name, word in names.items() if name != word)
     if renamed:
         notices.append(f"PLY permits ASCII names without spaces only: wrote {brief(renamed)}.")
     return notices
 
 
-def _all_triangles(faces: list[Ints], columns: dict[str, Array]) -> Ints:
+def _all_triangles(faces: list[Ints], columns: Columns) -> Ints:
     """Return faces of any numbers of corners as triangles."""
     points = np.stack([columns[axis] for axis in "xyz"], axis=1)
     return np.concatenate([triangles(corners, points) for corners in faces])
 
 
-def _with_types(columns: dict[str, Array]) -> tuple[dict[str, Array], list[str]]:
-    """Return columns in types that PLY has, and notices of those that became two."""
-    result, notices = {}, []
-    for name, values in columns.items():
-        if values.dtype == bool:
-            result[name] = values.view(np.uint8)
-        elif values.dtype.str[1:] in _NAMES:
-            result[name] = values
-        elif values.dtype.kind == "f" or (code := _whole_type(values)) is not None:
-            result[name] = values.astype("f8" if values.dtype.kind == "f" else code)
-        else:
-            upper = f"{name}_high"
-            result[name] = (values & values.dtype.type(2**32 - 1)).astype(np.uint32)
-            result[upper] = (values >> values.dtype.type(32)).astype("u4" if values.dtype.kind == "u" else "i4")
-            notices.append(f"PLY has no type for {name}: it is {name} + 4294967296 {upper} of the file.")
+class _Property(NamedTuple):
+    """A property that is written: the name of the column, the code of its type, and which half of its numbers it is."""
+
+    source: str
+    code: str
+    half: str = ""  # "low" or "high"
+
+    def of(self, columns: Columns) -> Array:
+        """Return its numbers, in the type of the column."""
+        values = columns[self.source]
+        if self.half:
+            kind = values.dtype.type
+            return values & kind(2**32 - 1) if self.half == "low" else values >> kind(32)
+        return values
+
+
+def _properties(ranges: dict[str, Range]) -> tuple[dict[str, _Property], list[str]]:
+    """Return columns as properties by their names, in types that PLY has, and notices of those that became two."""
+    result, notices = dict[str, _Property](), list[str]()
+    for name, found in ranges.items():
+        code = _code(found)
+        if code is not None:
+            result[name] = _Property(name, code)
+            continue
+        upper = f"{name}_high"
+        result[name] = _Property(name, "u4", "low")
+        result[upper] = _Property(name, "u4" if found.dtype.kind == "u" else "i4", "high")
+        notices.append(f"PLY has no type for {name}: it is {name} + 4294967296 {upper} of the file.")
     return result, notices
 
 
-def _whole_type(values: Ints) -> str | None:
-    """Return the smallest type of PLY that holds whole numbers of 8 bytes; None if there is none."""
-    low, high = (int(values.min()), int(values.max())) if len(values) else (0, 0)
+def _code(found: Range) -> str | None:
+    """Return the code of a type of PLY that holds the numbers of a range; None if there is none."""
+    if found.dtype == bool:
+        return "u1"
+    if found.dtype.str[1:] in _NAMES:
+        return found.dtype.str[1:]
+    if found.dtype.kind == "f":
+        return "f8"
     limits = (("i4", -(2**31), 2**31 - 1), ("u4", 0, 2**32 - 1), ("f8", -(2**53), 2**53))
-    return next((code for code, least, most in limits if least <= low and high <= most), None)
+    return next((code for code, least, most in limits if least <= found.low and found.high <= most), None)

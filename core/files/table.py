@@ -19,7 +19,7 @@ _COLORS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_g
 CHANNELS = ("red", "green", "blue", "alpha")
 _ALPHAS = (("alpha",), ("diffuse_alpha",), ("a",))
 _DEPTHS = (8, 10, 12, 16, 32)  # bits of a color
-_AXES = ("x", "y", "z")
+AXES = ("x", "y", "z")
 FARTHEST = 1e30  # of a coordinate, below the end of single precision, so that differences are numbers, too
 
 
@@ -72,7 +72,7 @@ def gather_columns(columns: dict[str, Array], path: Path) -> tuple[PointTable, d
     These are red, green, blue and alpha, in the numbers of the file, or none.
     """
     named = {name.lower(): name for name in reversed(columns)}  # the first of those that differ in case only
-    missing = [axis for axis in _AXES if axis not in named]
+    missing = [axis for axis in AXES if axis not in named]
     if missing:
         raise InvalidPointsError(
             f"{path} has no {' '.join(missing)} among its columns {brief(', '.join(columns))}. Each point needs x y z."
@@ -85,7 +85,7 @@ def gather_columns(columns: dict[str, Array], path: Path) -> tuple[PointTable, d
             return None
         return [left.pop(named[name]) for name in names]
 
-    coordinates = [left.pop(named[axis]) for axis in _AXES]
+    coordinates = [left.pop(named[axis]) for axis in AXES]
     table = PointTable(np.stack(coordinates, axis=1, dtype=np.float64))
     table.single = any(values.dtype == np.float32 for values in coordinates)
     channels = next(filter(None, map(take, _COLORS)), [])
@@ -96,7 +96,7 @@ def gather_columns(columns: dict[str, Array], path: Path) -> tuple[PointTable, d
         table.attributes[NORMAL] = np.stack(normals, axis=1)
     for name in columns:
         match = re.fullmatch(r"(.+)_x", name)
-        vector = [f"{match[1]}_{axis}" for axis in _AXES] if match else []
+        vector = [f"{match[1]}_{axis}" for axis in AXES] if match else []
         if match and all(component in left for component in vector):
             table.attributes[match[1]] = np.stack([left.pop(component) for component in vector], axis=1)
         elif name in left:
@@ -157,9 +157,16 @@ def depth_notices(colors: Array, path: Path) -> Iterator[str]:
         yield f"{path.name}: no color is above {full:g}, so the range is taken as 0 to {full:g}."
 
 
-def to_columns(table: PointTable) -> dict[str, Array]:
-    """Return the columns of a table by the names of files, numbers as they are; the reverse of `from_columns`."""
-    columns = dict(zip(_AXES, table.points.T, strict=True))
+def to_columns(table: PointTable, double: bool = True) -> dict[str, Array]:
+    """Return the columns of a table by the names of files, numbers as they are; the reverse of `from_columns`.
+
+    Parameters
+    ----------
+    table : PointTable
+    double : bool
+        Whether coordinates stay in double precision.
+    """
+    columns = dict(zip(AXES, (table.points if double else table.points.astype(np.float32)).T, strict=True))
     attributes = dict(table.attributes)
     if NORMAL in attributes and attributes[NORMAL].ndim == 2:
         columns.update(zip(_NORMALS, attributes.pop(NORMAL).T, strict=True))
@@ -175,7 +182,7 @@ def split_columns(name: str, values: Array) -> dict[str, Array]:
     """Return an attribute as columns of numbers by their names: vectors as one of each axis."""
     if values.ndim == 1:
         return {name: values}
-    return {f"{name}_{axis}": column for axis, column in zip(_AXES[: len(values.T)], values.T, strict=True)}
+    return {f"{name}_{axis}": column for axis, column in zip(AXES[: len(values.T)], values.T, strict=True)}
 
 
 def _free_name(name: str, columns: dict[str, Array]) -> str:

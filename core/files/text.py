@@ -19,7 +19,8 @@ from .lines import is_number, read_text
 from .loading import load
 from .names import standard_names
 from .ptx import holds_ptx, read_ptx
-from .table import PointTable, color_by, gather_columns, to_columns
+from .ranges import ColumnPieces, Range, ranges_of
+from .table import AXES, PointTable, color_by, gather_columns
 
 Pieces: TypeAlias = Iterator[tuple[PointTable, dict[str, Array]]]
 
@@ -243,41 +244,37 @@ def _vertex_names(rows: Rows) -> list[str]:
     return ["x", "y", "z", "r", "g", "b"] if rows.width == 6 else ["x", "y", "z"]
 
 
-def write_columns(path: Path, table: PointTable, delimiter: str = " ", double: bool = True) -> None:
-    """Write a table as text, a point a line, with the names of the columns before them.
+def write_columns(path: Path, pieces: ColumnPieces, delimiter: str = " ") -> None:
+    """Write columns as text, a point a line, with their names before them.
 
     Parameters
     ----------
     path : pathlib.Path
-    table : PointTable
+    pieces : callable
+        Doubles among their coordinates are written with the digits of double precision.
     delimiter : str
         With white space the line of names begins with #, which readers of XYZ files skip.
-    double : bool
-        Whether coordinates are written with the digits of double precision.
     """
-    columns = to_columns(table)
-    if not double:
-        columns.update((axis, columns[axis].astype(np.float32)) for axis in "xyz")
-    formats = [_text_format(values) for values in columns.values()]
-    columns = {name: shortest(item) if item.dtype == np.float32 else item for name, item in columns.items()}
-    if double:
-        formats[:3] = 3 * ["%.15g"]
+    ranges = ranges_of(pieces)[1]
+    line = delimiter.join(_text_format(name, found) for name, found in ranges.items()) + "\n"
     with open(path, "w", encoding="utf-8", newline="\n") as file:
-        names = [name.replace(delimiter, "_") for name in columns]
+        names = [name.replace(delimiter, "_") for name in ranges]
         file.write(("# " if delimiter.isspace() else "") + delimiter.join(names) + "\n")
-        line = delimiter.join(formats) + "\n"
-        for start in range(0, len(table.points), _BLOCK):  # blocks of rows take a third of the time of savetxt
-            block = [values[start : start + _BLOCK] for values in columns.values()]
-            rows = np.empty((len(block[0]), len(block)), object)  # doubles would round whole numbers of 64 bits
-            for index, values in enumerate(block):
-                rows[:, index] = values
-            file.write((line * len(rows)) % tuple(rows.reshape(-1).tolist()))
+        for columns in pieces():
+            given = [columns[name] for name in ranges]
+            given = [shortest(values) if values.dtype == np.float32 else values for values in given]
+            for start in range(0, len(given[0]), _BLOCK):  # blocks of rows take a third of the time of savetxt
+                block = [values[start : start + _BLOCK] for values in given]
+                rows = np.empty((len(block[0]), len(block)), object)  # doubles would round whole numbers of 64 bits
+                for index, values in enumerate(block):
+                    rows[:, index] = values
+                file.write((line * len(rows)) % tuple(rows.reshape(-1).tolist()))
 
 
-def _text_format(values: Array) -> str:
-    """Return the shortest format in which numbers are read back exactly."""
-    if values.dtype.kind in "biu":
+def _text_format(name: str, found: Range) -> str:
+    """Return the shortest format in which numbers are read back exactly; coordinates have all digits that help."""
+    if found.dtype.kind in "biu":
         return "%d"
-    if values.dtype.itemsize < 8:
+    if found.dtype.itemsize < 8:
         return "%.9g"
-    return "%.15g" if (values == np.rint(values)).all() and np.abs(values).max(initial=0.0) < 1e15 else "%s"
+    return "%.15g" if name in AXES or (found.whole and max(-found.low, found.high) < 1e15) else "%s"

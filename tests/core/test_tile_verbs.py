@@ -102,6 +102,67 @@ class TestRun:
         assert (code, "GB are allowed" in line["error"]) == (3, True)
 
 
+@pytest.mark.parametrize("ending", ["laz", "ply"])
+def test_one_file_is_the_files_of_tiles_joined(run, done, tmp_path, ending):
+    path = tmp_path / f"all.{ending}"
+    assert run("tiles", "measure", done, "--format", ending)[0] == 0
+    code, [line] = run("tiles", "report", done, "--tile-format", ending, "--one-file", path)
+    assert (code, line["notices"]) == (0, [])
+    tables = [read_points(tile) for tile in sorted(done.glob(f"tile_*.{ending}"))]
+    found = read_points(path)
+    np.testing.assert_allclose(found.points, np.concatenate([table.points for table in tables]), atol=1e-9)
+    np.testing.assert_array_equal(found.colors, np.concatenate([table.colors for table in tables]))
+    assert found.attributes.keys() == tables[0].attributes.keys()
+    for name, values in found.attributes.items():
+        np.testing.assert_array_equal(values, np.concatenate([table.attributes[name] for table in tables]))
+
+
+def test_choices_of_results(run, tmp_path):
+    """The inner side, as seen from the middle, with roughness, at smoothed points."""
+    rng = np.random.default_rng(1)
+    angle, along = rng.uniform(0.0, 2.0 * np.pi, 1500), rng.uniform(0.0, LENGTH, 1500)
+    radius = RADIUS * (1.0 + 0.03 * rng.normal(size=1500))
+    write_points(
+        tmp_path / "a.ply", PointTable(np.column_stack([along, radius * np.cos(angle), radius * np.sin(angle)]))
+    )
+    arguments = ("tiles", "run", tmp_path / "a.ply", "--out-dir", tmp_path / "out", "--tile-points", 800)
+    files = ("--smoothed", "--one-file", tmp_path / "all.ply")
+    code, [line] = run(*arguments, *files, "--viewpoint=5,0,0", "--roughness", "--wavelength", 4.0)
+    assert (code, line["tiles"]) == (0, 2)
+    assert "long against the halos" in line["notices"][0]
+    found = read_points(tmp_path / "all.ply")
+    radial = np.hypot(*found.points.T[1:])
+    assert radial.std() < 0.02 * RADIUS
+    assert np.all(np.einsum("ij,ij->i", found.attributes["normal"], found.points * [0.0, 1.0, 1.0]) < 0.0)
+    assert np.median(found.attributes["lb_roughness"]) / -RADIUS == pytest.approx(1.0, abs=0.05)  # to the axis
+    assert [path.name for path in sorted(tmp_path.glob("out/tile*.ply"))] == [
+        "tile_000000_smoothed.ply",
+        "tile_000001_smoothed.ply",
+    ]
+    code, [line] = run(*arguments, "--viewpoint=5,0,0", "--roughness")
+    assert (code, "other files or settings" in line["error"]) == (1, True)
+
+
+def test_one_file_waits_for_all_steps(run, scans, tmp_path):
+    run("tiles", "cut", scans, "--out-dir", tmp_path / "out", *OPTIONS)
+    code, [line] = run("tiles", "report", tmp_path / "out", "--one-file", tmp_path / "all.laz")
+    assert (code, "wait for the step extent" in line["error"]) == (1, True)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        ("--one-file", "all.npy"),
+        ("--one-file", "a.ply"),
+        ("--orient", "up", "--viewpoint=1,2,3"),
+        ("--wavelength", "1"),
+    ],
+)
+def test_choices_that_do_not_go_together(run, scans, tmp_path, monkeypatch, wrong):
+    monkeypatch.chdir(scans)
+    assert run("tiles", "run", ".", "--out-dir", tmp_path / "out", *wrong) == (2, [])
+
+
 def test_stages_give_the_same_to_the_bit(run, scans, done, tmp_path):
     out = tmp_path / "out"
     assert run("tiles", "cut", scans, "--out-dir", out, *OPTIONS, "--memory", "4GB")[1][0]["tiles"] == 2
