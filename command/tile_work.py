@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from . import clouds, core
-from .quantities import ROUGHNESS, eigenvector_name, rows_of
+from .quantities import eigenvector_name, rows_of, written_by
 
 STORE = "store"  # the folder within that of a run
 _PIECE = 1_000_000  # points that are read at once
@@ -151,7 +151,7 @@ def _table(store, number, smoothed):
         colors = core.files.unit_colors(np.stack(channels[:3], axis=1), alpha, store.manifest["full color"])
     measures = {row.attribute: row.of(results) for row in rows_of("analyze")}
     if core.tiles.ROUGHNESS in found:
-        measures[ROUGHNESS] = found[core.tiles.ROUGHNESS]
+        measures |= dict.fromkeys(written_by("roughness"), found[core.tiles.ROUGHNESS])
     if store.done("modes", number):
         vectors = store.read("modes", number, "modes").T
         measures |= {eigenvector_name(place): vector for place, vector in enumerate(vectors, 1)}

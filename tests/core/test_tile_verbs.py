@@ -11,6 +11,7 @@ from command import tile_work, verbs
 from command.main import run as run_command
 from command.stages import ToldStages
 from core.files import PointTable, read_points, write_points
+from tests.core import e57_files
 from tests.core.copc_files import write_copc
 
 LENGTH, RADIUS, COUNT = 10.0, 0.25, 2400
@@ -141,6 +142,23 @@ def test_choices_of_results(run, tmp_path):
     ]
     code, [line] = run(*arguments, "--viewpoint=5,0,0", "--roughness")
     assert (code, "other files or settings" in line["error"]) == (1, True)
+
+
+def test_sides_are_those_that_the_scanners_of_files_saw(run, tmp_path):
+    """Two scans of a tube from within, by scanners at other places."""
+    rng = np.random.default_rng(2)
+    angle, along = rng.uniform(0.0, 2.0 * np.pi, 900), rng.uniform(0.0, 4.0, 900)
+    places = np.column_stack([along, RADIUS * np.cos(angle), RADIUS * np.sin(angle)])
+    scans = []
+    for begin in (0.0, 2.0):
+        own = places[(along >= begin) & (along < begin + 2.0)] - [begin + 1.0, 0.0, 0.0]
+        scans.append((e57_files.points(own), len(own), e57_files.pose((1, 0, 0, 0), (begin + 1.0, 0.0, 0.0))))
+    (tmp_path / "a.e57").write_bytes(e57_files.seal(e57_files.make_e57(*scans)))
+    code, [line] = run("tiles", "run", tmp_path / "a.e57", "--out-dir", tmp_path / "out", "--orient", "viewpoint")
+    assert (code, line["notices"]) == (0, [])
+    found = read_points(tmp_path / "out" / "tile_000000.ply")
+    assert set(np.unique(found.attributes["scanner"][:, 0])) == {1.0, 3.0}
+    assert np.all(np.einsum("ij,ij->i", found.attributes["normal"], found.points * [0.0, 1.0, 1.0]) < 0.0)
 
 
 def test_one_file_waits_for_all_steps(run, scans, tmp_path):
