@@ -227,7 +227,9 @@ def tile_records(store, folder, suffix):
     """Return what a report tells of each tile: its points, area, seconds and notices, or the error."""
     records = []
     for number in range(store.count):
-        path = tile_path(folder, number, suffix) if suffix else core.tiles.tile_folder(store.folder, number)
+        path = tile_path(folder, number, suffix)
+        if not path.is_file():  # results are in the store only, or nowhere
+            path = core.tiles.tile_folder(store.folder, number)
         record = {
             "file": str(path),
             "tile": number,
