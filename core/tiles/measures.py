@@ -47,7 +47,9 @@ def orient_tile(site: Site, fitted: Fitted) -> tuple[Fitted | None, Told]:
     normals, patch = orient_patches(nearest, surface.quadrics.normals, surface.sample.places)
     first, second = near_edges(nearest)
     count = int(patch.max()) + 1
-    edges = sparse.coo_array((np.ones(len(first)), (patch[first], patch[second])), shape=(count, count)).tocsr().tocoo()
+    inner = site.inner(scaled)
+    within = 0.5 * (inner[first].astype(float) + inner[second])  # the tile in which a patch lies decides
+    edges = sparse.coo_array((within, (patch[first], patch[second])), shape=(count, count)).tocsr().tocoo()
     across = edges.row != edges.col
     return Fitted(surface) if changed else None, {
         "normal": site.own(scaled, normals, 0.0),
