@@ -49,11 +49,14 @@ def add_las_choices(parser):
         "--classes", default="", metavar="NUMBERS", help='classes of LAS files to read, such as "2 5"; else all'
     )
     parser.add_argument("--withheld", action="store_true", help="read points of LAS files, too, that are withheld")
+    parser.add_argument(
+        "--meters", action="store_true", help="convert coordinates of LAS files that are in feet or the like to meters"
+    )
 
 
 def las_choices(arguments):
-    """Return which points of LAS files these options ask for."""
-    return core.files.LasChoices(core.files.parse_classes(arguments.classes), arguments.withheld)
+    """Return which points of LAS files these options ask for, and in which unit."""
+    return core.files.LasChoices(core.files.parse_classes(arguments.classes), arguments.withheld, arguments.meters)
 
 
 def parse_share(text):

@@ -18,6 +18,7 @@ from .verb import ONE_LINE, Verb
 _SETTINGS = [LAPLACIAN[field.name] for field in fields(core.LaplacianOptions)]
 _EACH = 0.01  # of the work is told
 _READ, _WRITTEN = 0.02, 0.02  # shares of a run that reading and writing files take about
+_CHOICES = ("classes", "withheld", "meters", "columns", "bounds", "level")  # options for what is read of files
 _REPORT = f"tiles{SUFFIX}"  # in the folder of a run
 
 
@@ -56,7 +57,11 @@ class _Cutting(_TileVerb):
         add_choices(parser)
         corners = [f"{axis}{end}" for end in (1, 2) for axis in "XYZ"]
         parser.add_argument(
-            "--bounds", type=float, nargs=6, metavar=tuple(corners), help="lowest and highest corner of a box to read"
+            "--bounds",
+            type=float,
+            nargs=6,
+            metavar=tuple(corners),
+            help="lowest and highest corner of a box to read, in meters with --meters",
         )
         parser.add_argument("--level", type=int, metavar="INT", help="last level of detail of COPC files to read")
 
@@ -82,7 +87,7 @@ class _Cutting(_TileVerb):
         folder, memory = arguments.folder / STORE, arguments.memory or core.tiles.memory_of_worker(count)
         known = {
             "sources": [str(path.resolve()) for path in arguments.sources],
-            "read": {name: getattr(arguments, name) for name in ("classes", "withheld", "columns", "bounds", "level")},
+            "read": {name: getattr(arguments, name) for name in _CHOICES},
         }
         measures = tile_choices.measures(arguments)
         if folder.exists():

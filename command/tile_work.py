@@ -91,7 +91,8 @@ class Sources:
                 self.notices.append(f"{path.name} has no points.")
         if len(self.broken) == len(self._sizes):
             raise next(iter(self.broken.values()))
-        self.notices += [f"Left out a file: {error}" for error in self.broken.values()]
+        left_out = [f"Left out a file: {error}" for error in self.broken.values()]
+        self.notices = core.files.join_notices([*self.notices, *left_out])
         found = np.concatenate(channels)
         self.full = core.files.full_color(found) if len(found) else 0.0
 

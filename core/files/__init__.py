@@ -18,6 +18,7 @@ from .frames import frame_number, numbered_files, order_frames
 from .las_choices import LasChoices, parse_classes
 from .lines import brief
 from .mesh import MESHES, write_mesh
+from .notices import join_notices
 from .origin import choose_origin, is_coarse
 from .pieces import Chunks, Extent, chunks, extent, has_levels, join_pieces
 from .ply import PlyVertices, read_elements, read_vertex_columns, read_vertex_names, write_vertex_columns

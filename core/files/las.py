@@ -12,6 +12,7 @@ from ..types import Array, Bools, Floats
 from .copc import Box, Octree, read_octree, records_of
 from .las_choices import LasChoices
 from .las_packing import PackedChunk, check_header, check_size
+from .reference import Reference, read_reference
 from .rows import too_short
 from .table import CHANNELS, PointTable, color_by
 
@@ -23,7 +24,6 @@ _NUMBERS = (1, 3)  # of a column that becomes an attribute
 _BLOCK = 2**16  # points that are read at once
 _CLASSES = 256
 _MOST_DEGREES = 360.0
-_GEOGRAPHIC = (1024, 2)  # key of GeoTIFF and its value
 
 
 class LasFile(NamedTuple):
@@ -37,12 +37,15 @@ class LasFile(NamedTuple):
         At the first point.
     chunks : list of PackedChunk
         Of compressed points.
+    reference : Reference
+        What it states of its coordinates.
     """
 
     path: Path
     file: BinaryIO
     reader: Any
     chunks: list[PackedChunk]
+    reference: Reference
 
     @property
     def octree(self) -> Octree | None:
@@ -86,8 +89,11 @@ class LasFile(NamedTuple):
 
     def is_geographic(self, points: Floats) -> bool:
         """Whether coordinates, (n, 3), are longitude and latitude: the file states it, and they are not too large."""
-        near = bool(np.abs(points[:, :2]).max(initial=0.0) <= _MOST_DEGREES)
-        return near and _is_geographic(self.reader.header)
+        return self.reference.geographic and bool(np.abs(points[:, :2]).max(initial=0.0) <= _MOST_DEGREES)
+
+    def scale(self, las: LasChoices) -> Floats:
+        """Return the factors of coordinates in the file to those that are read, (3,)."""
+        return self.reference.meters if las.meters else np.ones(3)
 
 
 @contextmanager
@@ -112,7 +118,7 @@ def opened_las(path: Path) -> Iterator[LasFile]:
             # Not in parallel: that takes memory for as many points as a file names in a chunk.
             with laspy.open(file, closefd=False, read_evlrs=False, laz_backend=laspy.LazBackend.Lazrs) as reader:
                 chunks = check_size(file, reader.header, path)
-                yield LasFile(path, file, reader, chunks)
+                yield LasFile(path, file, reader, chunks, read_reference(reader.header))
         except (laspy.errors.LaspyException, lazrs.LazrsError) as error:
             raise ValueError(f"{error}") from error  # `read_points` reports it as numpy's
 
@@ -136,7 +142,7 @@ def read_las(path: Path, las: LasChoices = LasChoices()) -> PointTable:
             for name, values in columns.items():
                 _put(table, name, rows, values, count)
             done = rows.stop
-        table.notices += tally.notices(path)
+        table.notices += [*tally.notices(path), *file.reference.notices(path, las.meters)]
         tally.refuse_none(path)
         if done < count:
             table.points = table.points[:done]
@@ -176,7 +182,8 @@ def las_pieces(
     level : int, optional
         The last level of an octree that is read.
     """
-    header = file.reader.header
+    header, scale = file.reader.header, file.scale(tally.choices)
+    box = None if box is None else (box[0] / scale, box[1] / scale)
     if box is not None and ((header.maxs < box[0]) | (header.mins > box[1])).any():
         return
     whole = box is None and level is None
@@ -187,7 +194,7 @@ def las_pieces(
         blocks = records_of(file.file, header, octree.nodes(box, level), size)
     for block in blocks:
         kept = tally.keep(block)
-        points = file.places(block, kept)
+        points = file.places(block, kept) * scale
         if len(points):
             yield points, file.columns(block, kept, tally.choices.withheld)
     if octree is None and tally.total < header.point_count:
@@ -255,12 +262,3 @@ def _put(table: PointTable, name: str, rows: slice, values: Array, count: int) -
     if name not in table.attributes:
         table.attributes[name] = np.empty((count, *values.shape[1:]), values.dtype)
     table.attributes[name][rows] = values
-
-
-def _is_geographic(header: Any) -> bool:
-    """Whether a file states that its coordinates are longitude and latitude: by its keys of GeoTIFF, or by WKT."""
-    words = "".join(detail.string for detail in header.vlrs.get("WktCoordinateSystemVlr"))
-    if words:
-        return ("GEOG" in words or "GEODCRS" in words) and "PROJ" not in words
-    keys = [key for detail in header.vlrs.get("GeoKeyDirectoryVlr") for key in detail.geo_keys]
-    return any((key.id, key.value_offset) == _GEOGRAPHIC for key in keys)

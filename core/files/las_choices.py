@@ -10,7 +10,7 @@ _GREATEST = 255  # class of LAS
 
 @dataclass(frozen=True)
 class LasChoices:
-    """Which points of LAS files are read.
+    """Which points of LAS files are read, and in which unit.
 
     Attributes
     ----------
@@ -18,10 +18,13 @@ class LasChoices:
         Those whose points are read; empty for all.
     withheld : bool
         Whether points are read that are flagged as withheld, which means deleted.
+    meters : bool
+        Whether coordinates in another unit, which the file states, are converted to meters.
     """
 
     classes: frozenset[int] = frozenset()
     withheld: bool = False
+    meters: bool = False
 
 
 def parse_classes(text: str) -> frozenset[int]:

@@ -116,7 +116,7 @@ class Chunks:
                 near = near and file.is_geographic(points)
                 yield points, attributes
             self.degrees = near and tally.total > 0
-            self.notices += tally.notices(self._path)
+            self.notices += [*tally.notices(self._path), *file.reference.notices(self._path, self._las.meters)]
 
     def _read_whole(self, suffix: str) -> Iterator[tuple[PointTable, dict[str, Array]]]:
         """Yield all points of a file, or of each scan of one."""
@@ -153,7 +153,7 @@ def chunks(
     level : int, optional
         The last level of detail of a COPC file that is read, from 0, which is the coarsest.
     las : LasChoices
-        Which points of LAS files are read.
+        Which points of LAS files are read, and in which unit; bounds are in it, too.
     columns : str
         Names of the columns of text, as of `read_points`.
 
@@ -215,13 +215,13 @@ def extent(path: Path | str, las: LasChoices = LasChoices()) -> Extent:
     ----------
     path : pathlib.Path
     las : LasChoices
-        Which points of LAS files would be read.
+        Which points of LAS files would be read, and in which unit.
     """
     path = Path(path)
     if path.suffix.lower() in SCANS:
         with reading(path), opened_las(path) as file:
             header, names = file.reader.header, file.names(las.withheld)
-            low, high = np.array([header.mins, header.maxs] if header.point_count else _NOWHERE)
+            low, high = np.array([header.mins, header.maxs] if header.point_count else _NOWHERE) * file.scale(las)
             return Extent(int(header.point_count), low, high, names)
     count, (low, high), found = 0, _NOWHERE, dict[str, None]()
     for points, attributes in chunks(path):

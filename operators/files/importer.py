@@ -62,6 +62,12 @@ class ImportOperator(JobOperator, ImportHelper):
         description="Import points of LAS files, too, that are flagged as withheld, which means deleted",
         default=False,
     )
+    meters: BoolProperty(
+        name="Convert to Meters",
+        description="Convert coordinates of LAS files that are in feet or the like, as the file states, to meters; else"
+        " they are imported as they are",
+        default=False,
+    )
     frame: BoolProperty(
         name="Frame in View",
         description="Let the 3D views look at the imported points, unless a script imports them",
@@ -90,8 +96,8 @@ class ImportOperator(JobOperator, ImportHelper):
         return [folder / name for name in names] or [Path(bpy.path.abspath(self.filepath))]
 
     def las_choices(self) -> LasChoices:
-        """Return which points of LAS files are read."""
-        return LasChoices(parse_classes(self.classes), self.withheld)
+        """Return which points of LAS files are read, and in which unit."""
+        return LasChoices(parse_classes(self.classes), self.withheld, self.meters)
 
     def finish(self, context, objects, results):
         """Add objects of what was read."""

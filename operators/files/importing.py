@@ -87,7 +87,7 @@ class MESHFREE_OT_import_points(ImportOperator, bpy.types.Operator):
         """Names of the settings; some only for sequences or for a kind of file; those of text until one is chosen."""
         sequence = ("sequence", "numbers") if self.sequence else ("sequence",)
         suffixes = {path.suffix.lower() for path in self.chosen()}
-        scans = ("classes", "withheld") if suffixes & {*SCANS} else ()
+        scans = ("classes", "withheld", "meters") if suffixes & {*SCANS} else ()
         text = ("columns",) if suffixes & {"", *TEXTS} else ()
         return "up", "kind", "attributes", *text, *scans, "surface", *sequence, "frame"
 

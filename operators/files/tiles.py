@@ -12,7 +12,7 @@ from ... import core
 from ...command.quantities import MEAN_CURVATURE, PREFIX
 from ...core import PointCloudError
 from ...core.errors import NotEnoughMemoryError
-from ...core.files import READABLE, SCANS, LasChoices, PointTable, chunks, extent, join_pieces
+from ...core.files import READABLE, SCANS, LasChoices, PointTable, chunks, extent, join_notices, join_pieces
 from ...core.memory import available_memory
 from ..objects.attributes import deselect
 from ..objects.box import Box, box_of
@@ -101,7 +101,7 @@ class MESHFREE_OT_import_tiles(ImportOperator, bpy.types.Operator):
         """Names of the settings."""
         density = {"NUMBER": ("density", "count"), "LEVEL": ("density", "level")}.get(self.density, ("density",))
         color = ("color",) if self.attributes else ()
-        return *density, "box", "kind", "attributes", *color, "classes", "withheld", "frame"
+        return *density, "box", "kind", "attributes", *color, "classes", "withheld", "meters", "frame"
 
     def column_names(self):
         """Return the names of the columns of the first chosen file; none of one that cannot be read.
@@ -192,7 +192,7 @@ def _read_anew(paths, wanted, name, progress) -> tuple[PointTable, int]:
     if not kept and wanted.box is not None:
         raise PointCloudError(f"None of the {seen.total:,} points is inside the box. Move or scale its object.")
     table = join_pieces(kept, Path(name), seen.single, seen.degrees)
-    table.notices = [*dict.fromkeys(seen.notices), *table.notices]
+    table.notices = [*join_notices(seen.notices), *table.notices]
     return table, seen.total
 
 

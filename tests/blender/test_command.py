@@ -164,6 +164,12 @@ def test_classes_and_withheld_points_of_scans(run, tmp_path):
         code, (line,) = run("analyze", tmp_path / "in.las", *options)
         assert (code, line["points"]) == (0, count)
         assert any("points of other classes" in notice for notice in line["notices"])
+    las.vlrs.append(laspy.vlrs.known.WktCoordinateSystemVlr('PROJCS["a",UNIT["foot",0.3048]]'))
+    las.write(str(tmp_path / "in.las"))
+    feet, meters = (run("analyze", tmp_path / "in.las", *options)[1][0] for options in ([], ["--meters"]))
+    assert "coordinates are in feet" in feet["notices"][1]
+    assert "converted to meters" in meters["notices"][1]
+    assert meters["total_area"] == pytest.approx(0.3048**2 * feet["total_area"], rel=1e-5)
     code, (line,) = run("analyze", tmp_path / "in.las", "--classes", "ground")
     assert "no class of LAS" in line["error"]
 

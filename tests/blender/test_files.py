@@ -230,6 +230,20 @@ class TestClassesAndWithheldPoints:
             run_import(path, classes="2")
         assert not bpy.data.objects
 
+    def test_feet_stay_and_come_back_or_become_meters(self, core, path, tmp_path, capfd):
+        import laspy
+
+        las = laspy.read(path)
+        las.vlrs.append(laspy.vlrs.known.WktCoordinateSystemVlr('PROJCS["a",UNIT["foot",0.3048]]'))
+        las.x = las.x + 1e6
+        las.write(str(path))
+        for meters, factor, told in ((False, 1.0, "set Unit Scale"), (True, 0.3048, "converted to meters")):
+            run_import(path, meters=meters)
+            assert told in capfd.readouterr().out
+            bpy.ops.meshfree.export_points(filepath=str(tmp_path / "a.xyz"), attributes="NONE")
+            places = core.files.read_points(tmp_path / "a.xyz").points
+            assert_allclose(places, factor * las.xyz[las.withheld == 0], rtol=0.0, atol=1e-4)
+
 
 class TestColumns:
     def test_become_attributes(self, tmp_path):

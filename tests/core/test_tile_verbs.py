@@ -82,7 +82,12 @@ class TestRun:
         assert (line["files"], line["failed"], line["points"]) == (2, 0, COUNT)
 
     def test_other_files_or_settings_need_another_folder(self, run, scans, done):
-        for arguments in ((scans / "a.ply",), (scans, "--boundary", "off"), (scans, "--classes", "2")):
+        for arguments in (
+            (scans / "a.ply",),
+            (scans, "--boundary", "off"),
+            (scans, "--classes", "2"),
+            (scans, "--meters"),
+        ):
             code, [line] = run("tiles", "run", *arguments, "--out-dir", done)
             assert (code, "other files or settings" in line["error"]) == (1, True)
 
