@@ -2,6 +2,7 @@
 
 import bpy
 
+from ..core.files import SCANS
 from ..operators import registration
 from ..operators.files.importing import OWN
 from ..operators.objects.reading import TYPES
@@ -108,6 +109,16 @@ class MESHFREE_FH_points(bpy.types.FileHandler):
         return context.area is not None and context.area.type == "VIEW_3D"
 
 
+class MESHFREE_FH_tiles(bpy.types.FileHandler):
+    """Offer laser scans dropped onto a 3D view as one object, too, in the menu that Blender shows for two handlers"""
+
+    bl_idname = "MESHFREE_FH_tiles"
+    bl_label = "Point Tiles as One Object"
+    bl_import_operator = "meshfree.import_tiles"
+    bl_file_extensions = ";".join(SCANS)
+    poll_drop = MESHFREE_FH_points.poll_drop
+
+
 def _draw_weights(menu, context):
     menu.layout.separator()
     menu.layout.operator("meshfree.smooth_weights", text="Smooth Along Surface")
@@ -148,4 +159,4 @@ def detach():
         menu.remove(draw)
 
 
-CLASSES = (MESHFREE_MT_object, MESHFREE_MT_points, MESHFREE_FH_points)
+CLASSES = (MESHFREE_MT_object, MESHFREE_MT_points, MESHFREE_FH_points, MESHFREE_FH_tiles)

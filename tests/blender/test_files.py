@@ -586,6 +586,9 @@ class TestMenus:
             ".splat",
             ".spz",
         }
+        tiles = handlers.pop("MESHFREE_FH_tiles")  # Blender asks where two know a kind of file
+        assert (tiles.bl_import_operator, tiles.bl_file_extensions) == ("meshfree.import_tiles", ".las;.laz")
+        assert tiles.bl_label != ours.bl_label
         theirs = {extension for handler in handlers.values() for extension in handler.bl_file_extensions.split(";")}
         assert not extensions & (theirs | {".ply", ".obj"})
 
