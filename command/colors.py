@@ -1,8 +1,24 @@
-"""Colors of points: their name among the attributes, and the curve of sRGB."""
+"""Colors of points: their name among the attributes, the curve of sRGB, and how they are averaged."""
 
 import numpy as np
 
+from . import core
+
 COLOR = "Color"  # the name that imported ones get
+
+
+_GAMMA = 2.2  # splats are trained in sRGB
+
+
+def of_splats(base):
+    """Return the view-independent colors of splats, linear and opaque, (n, 4), by their harmonics of degree 0."""
+    seen = np.maximum(core.splats.CONSTANT * base[:, :3] + 0.5, 0.0) ** _GAMMA
+    return np.column_stack([seen, np.ones(len(seen))])
+
+
+def average(colors, interpolate):
+    """Return linear colors elsewhere, by a function that interpolates, and may overshoot, never below zero."""
+    return np.clip(interpolate(colors), 0.0, None)
 
 
 def linear(colors):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from . import clouds, core
+from . import clouds, colors, core
 from .cloud_verb import SurfaceVerb, floaters
 from .meshing import MESH, close_gaps
 from .settings import LAPLACIAN, chosen
@@ -29,21 +29,20 @@ class Mesh(SurfaceVerb):
         return {"points": len(cloud.points), **figures}, [*laplacian.notices, *written]
 
 
-def _seen_colors(splats):
-    """Return the view-independent colors of splats, opaque, (n, 4)."""
-    return np.column_stack([core.splats.CONSTANT * splats.colors + 0.5, np.ones(len(splats))])
-
-
 def _on_vertices(cloud, laplacian, vertices):
     """Return vertices in the coordinates of the file, with the columns and colors of the points."""
-    colors = cloud.given.colors if cloud.splats is None else _seen_colors(cloud.splats)
+    if cloud.splats is not None:
+        tint = colors.of_splats(cloud.splats.colors)
+    else:
+        tint = None if cloud.given.colors is None else colors.linear(cloud.given.colors)
     single = cloud.splats is not None or cloud.given.single
     table = core.files.PointTable(vertices + cloud.place, single=single)
-    if cloud.columns or colors is not None:
+    if cloud.columns or tint is not None:
         carrying, count = core.values_on_mesh(laplacian, vertices), len(vertices)
         for name, values in cloud.columns.items():
             carry = carrying.interpolate if values.dtype.kind == "f" else carrying.labels
             table.attributes[name] = carry(values)[-count:]
-        if colors is not None:
-            table.colors = np.clip(carrying.interpolate(colors)[-count:], 0.0, 1.0)
+        if tint is not None:
+            averaged = colors.average(tint, carrying.interpolate)[-count:]
+            table.colors = np.clip(colors.srgb(averaged), 0.0, 1.0)
     return table

@@ -1,15 +1,13 @@
 """How objects look without results: the colors of their points, as of a photograph, and their own material."""
 
 import bpy
-import numpy as np
 
-from ... import core
+from ...command.colors import of_splats
 from .attributes import SOLID, read_attribute
 from .modifiers import DISPLAY_TAG, get_input, is_display
 from .splats import BASE, has_splats
 
 COLORS = "BYTE_COLOR", "FLOAT_COLOR"  # types of attributes
-_GAMMA = 2.2  # splats are trained in sRGB
 
 
 def is_color(data, name: str) -> bool:
@@ -30,10 +28,7 @@ def own_colors(data) -> str:
 
 def splat_colors(data):
     """Return the view-independent colors of splats, linear and opaque, (n, 4)."""
-    base = read_attribute(data, BASE)
-    base[:, :3] = np.maximum(core.splats.CONSTANT * base[:, :3] + 0.5, 0.0) ** _GAMMA
-    base[:, 3] = 1.0
-    return base
+    return of_splats(read_attribute(data, BASE))
 
 
 def own_material(obj):

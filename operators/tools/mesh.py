@@ -6,7 +6,7 @@ import numpy as np
 from bpy.props import BoolProperty, FloatProperty
 
 from ... import core
-from ...command.colors import COLOR
+from ...command.colors import COLOR, average
 from ...command.meshing import GAP, MESH
 from ...command.quantities import quantity
 from ..objects.attributes import DISC, STORABLE, point_count, read_attribute, write_attribute
@@ -150,8 +150,9 @@ class _Kept:
         kind = quantity(name).carried if values.dtype.kind == "f" else "label"
         if kind == "share":  # areas stay those of the points: the area of a mesh is that of its faces
             kind = "smooth"
-        result = carry(carrying, kind, values)
-        return np.clip(result, 0.0, None) if self._types[name] in COLORS else result
+        if self._types[name] in COLORS:
+            return average(values, carrying.interpolate)
+        return carry(carrying, kind, values)
 
     def write(self, obj):
         """Write the data to the vertices of a mesh."""

@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import core
 from benchmarks.samplings import fibonacci_sphere, square_grid
 from command import verbs
+from command.colors import linear
 from command.main import run as run_command
 from command.meshing import close_gaps
 from command.quantities import rows_of
@@ -223,6 +224,19 @@ class TestMesh:
         assert_allclose(mesh.attributes["height"], 0.5 + 0.5 * points[:, 2], atol=0.01)
         assert_allclose(mesh.colors[:, 0], 0.5 + 0.5 * points[:, 2], atol=0.02)
         assert set(mesh.attributes["side"]) == {0, 1}
+
+    def test_colors_are_averaged_as_light(self, run, tmp_path):
+        """Of black and white points, as in Blender; in sRGB their mean would be a darker gray."""
+        given = np.ones((800, 4), np.float32)
+        given[:, :3] = (np.random.default_rng(3).random(800) < 0.5)[:, None]
+        write_points(tmp_path / "a.ply", PointTable(SPHERE, colors=given))
+        code, _ = run("mesh", tmp_path / "a.ply", "--out", tmp_path / "b.ply")
+        mesh = read_points(tmp_path / "b.ply")
+        carrying = core.values_on_mesh(core.build_laplacian(SPHERE), mesh.points)
+        exact = np.clip(carrying.interpolate(given.astype(float))[-len(mesh.points) :], 0.0, 1.0)
+        assert code == 0
+        assert ((exact > 0.3) & (exact < 0.7)).any()
+        assert_allclose(linear(mesh.colors), exact, atol=0.01)
 
     @pytest.mark.parametrize(("removed", "closed"), [([44], 2), ([44, 45, 46], 6), ([11, 88], 4), ([44, 55], 0)])
     def test_small_holes_of_a_mesh_are_closed(self, removed, closed):
