@@ -214,7 +214,7 @@ def thin_out(path):
 
 
 def import_tiles(path):
-    """Four tiles of a terrain: an overview of 8,000 points, and a place of it with all points, enlarged four times."""
+    """Four tiles of a terrain: an overview of 8,000 points, and a place of it with all points, enlarged five times."""
     random, write = np.random.default_rng(5), part("core.files").write_points
     with TemporaryDirectory() as folder:
         names = [f"tile_{x}_{y}.ply" for x in (0, 1) for y in (0, 1)]
@@ -229,14 +229,14 @@ def import_tiles(path):
         tiles = {"directory": folder, "files": [{"name": name} for name in names], "color": "height"}
         bpy.ops.meshfree.import_tiles(count=8000, **tiles)
         overview = bpy.context.object
-        bpy.ops.object.empty_add(type="CUBE", radius=10.0, location=(50.0, 50.0, 0.0))
+        bpy.ops.object.empty_add(type="CUBE", radius=10.0, location=(63.0, 45.0, 0.0))
         bpy.ops.meshfree.import_tiles(density="ALL", box=bpy.context.object.name, **tiles)
     detail = bpy.context.object
-    detail.scale = 3 * (4.0,)
-    for obj in (overview, detail):
-        studio.show(obj, "height", radius=0.9)
+    detail.scale = 3 * (5.0,)
+    for obj, radius in ((overview, 0.9), (detail, 1.5)):  # the points inside the box are random, so gaps are wider
+        studio.show(obj, "height", radius=radius)
         studio.set_range(obj, -4.0, 4.0)
-    grid([[overview, detail]], path)
+    grid([[overview, detail]], path, view=(0.3, -1.0, 0.9), size=(800, 300), gap=0.04)
 
 
 def sequence(path):

@@ -113,7 +113,7 @@ class MESHFREE_FH_tiles(bpy.types.FileHandler):
     """Offer laser scans dropped onto a 3D view as one object, too, in the menu that Blender shows for two handlers"""
 
     bl_idname = "MESHFREE_FH_tiles"
-    bl_label = "Point Tiles as One Object"
+    bl_label = "Point Tiles"
     bl_import_operator = "meshfree.import_tiles"
     bl_file_extensions = ";".join(SCANS)
     poll_drop = MESHFREE_FH_points.poll_drop

@@ -42,8 +42,29 @@ def drop(gui):
     gui.shot("dropped")
 
 
+LASERS = """
+import laspy
+for number, name in enumerate(("a.laz", "b.laz")):
+    las = laspy.LasData(laspy.LasHeader(point_format=6, version="1.4"))
+    las.xyz = sphere_points(2000)[number::2]
+    las.write(os.path.join(bpy.app.tempdir, name))
+"""
+
+
 class TestDrop:
     """A file that is dropped onto the view; the drop itself is the call that Blender makes of it."""
+
+    def test_laser_scans_become_one_object_by_choice(self, gui):
+        gui.python(f"import os\n{LASERS}")
+        gui.point_at_view()
+        gui.python(DROP.replace('{"name": "Egg.xyz"}', '{"name": "a.laz"}, {"name": "b.laz"}'))
+        gui.settle()
+        gui.key("t")  # of Import Tiles in the menu, whose letter is underlined there
+        gui.settle()
+        gui.shot("tiles")
+        gui.key("Return")
+        gui.wait_until("'Tiles' in bpy.data.objects", 60)
+        assert gui.python("[len(obj.data.vertices) for obj in bpy.data.objects]") == [2000]
 
     def test_closing(self, gui):
         drop(gui)
