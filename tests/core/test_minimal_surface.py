@@ -7,7 +7,7 @@ import pytest
 
 import core
 from benchmarks.plateau import cap, catenoid, catenoid_errors, helicoid, tube
-from benchmarks.samplings import fibonacci_sphere, grid_points, hemisphere_random, square_grid
+from benchmarks.samplings import fibonacci_sphere, grid_points, hemisphere_random, random_sphere, square_grid
 from core.applications.deforming.boundary_curve import BoundaryCurve
 
 
@@ -201,6 +201,18 @@ class TestEnding:
         np.testing.assert_array_equal(film.points, points)
         assert film.areas.sum() == film.initial_area == expected.initial_area
         assert len(film.area_history) == 0
+
+    def test_noise_at_a_crease_is_not_followed(self):
+        """A belt of a sphere whose fixed ends are wide, where steps go on without getting anywhere."""
+        points = random_sphere(1600)
+        points = points[np.abs(points[:, 2]) < 0.5]
+        fixed = np.abs(points[:, 2]) > 0.36
+        film = core.minimal_surface(points, fixed)
+        assert (film.converged, film.steps < 9) == (True, True)
+        further = core.minimal_surface(points, fixed, epsilon=0.0, max_steps=film.steps + 2)
+        moved = np.linalg.norm(further.points - film.points, axis=1)
+        assert np.sqrt(np.mean(moved**2)) < 0.02 * np.sqrt(film.areas.mean())
+        assert abs(further.areas.sum() / film.areas.sum() - 1.0) < 5e-4
 
     @pytest.mark.parametrize("raising", [False, True])
     def test_callback(self, coarse, raising):

@@ -24,6 +24,7 @@ _HALVINGS = 3  # of a step that went too far
 _NECK = 0.7  # smoothing length times curvature where the surface is no longer resolved
 _FEW = 16  # points that may be less well resolved, or lie at a free edge by mistake
 _SURPLUS = 0.01  # of the tolerance: the area that may still be saved when the iteration ends
+_GAIN = 0.5  # of the area that may still be saved, after a step of Newton that is not lost in noise, at most
 _FREE_EDGE = 4.0  # spacings from fixed points to points of a free edge
 _ON_CURVE = 0.5  # spacings from the boundary's curve to its points, at most
 _LOPSIDED = 0.2  # mean offset of the neighbours over their mean distance at a boundary, at least
@@ -85,7 +86,9 @@ def minimal_surface(
         Points that stay: every boundary of the surface, and any others.
     epsilon : float
         The iteration ends when a step changes the area by a smaller share than this, and the next one could save no
-        more than a hundredth of it. Zero: go on to the last step.
+        more than a hundredth of it; or when a step that was to save a smaller share than this lowers neither the area
+        nor, by half, what the next one could save.
+        Zero: go on to the last step.
     max_steps : int
         Most steps to take.
     options : LaplacianOptions
@@ -141,6 +144,9 @@ def minimal_surface(
     That is reported as pinching, with the last surface that they did resolve. Before, the area may hardly change for
     many steps; a definite Jacobi operator distinguishes convergence from that.
 
+    The area is known up to the noise of an operator that is found anew for moved points. At a crease, as between the
+    surface and fixed points beyond its boundary, that may be more than the tolerance, and more steps only follow it.
+
     References
     ----------
     Petronetto et al. 2013, section 5, Figure 14. Pinkall, Polthier. Computing discrete minimal surfaces and their
@@ -173,7 +179,7 @@ def minimal_surface(
     state = film.state(points, first)
     initial_area, limit = state.area, max(_NECK, state.curved)
     area_history: list[float] = []
-    reason = "step limit"
+    reason, rise = "step limit", 0.0
     try:
         while len(area_history) < max_steps:
             before = state
@@ -181,12 +187,17 @@ def minimal_surface(
             if failure:
                 reason = failure
                 break
+            noisy = state.rises_by_noise(before, epsilon)
+            rise = state.area / before.area - 1.0 if noisy else 0.0
+            if noisy and state.savings >= before.savings:
+                state, reason = before, "converged"
+                break
             area_history.append(state.area)
             if callback is not None and callback(len(area_history), state.points.copy(), state.area) is False:
                 reason = "stopped"
                 break
             settled = state.definite and state.savings <= _SURPLUS * epsilon * state.area
-            if settled and abs(state.area - before.area) < epsilon * state.area:
+            if noisy or (settled and abs(state.area - before.area) < epsilon * state.area):
                 reason = "converged"
                 break
     except Cancelled:
@@ -199,12 +210,12 @@ def minimal_surface(
         converged=reason == "converged",
         steps=len(area_history),
         reason=reason,
-        notices=first.notices + _notices(reason, len(area_history)),
+        notices=first.notices + _notices(reason if rise <= epsilon else "restless", len(area_history), rise),
     )
 
 
-def _notices(reason: str, steps: int) -> list[str]:
-    """Report why the iteration ended before convergence."""
+def _notices(reason: str, steps: int, rise: float) -> list[str]:
+    """Report why the iteration ended before convergence, or by which share the area changes at random afterwards."""
     texts = {
         "step limit": f"The surface had not converged after {steps} steps. Allow more steps, or a larger tolerance.",
         "stopped": f"The iteration was stopped after {steps} steps, before the surface had converged.",
@@ -215,6 +226,10 @@ def _notices(reason: str, steps: int) -> list[str]:
         "unresolved": (
             f"After {steps} steps the points no longer resolve the surface. Use more points, or spread"
             " them more evenly. The last valid step was kept."
+        ),
+        "restless": (
+            f"The surface has converged, but its area changes by {rise:.2%} at random, more than the tolerance: sharp"
+            " edges, as where it meets fixed parts of another slope, are not resolved. Fix only its boundary there."
         ),
         "stalled": f"After {steps} steps no further one lowered the area. Use more points, or spread them more evenly.",
     }
@@ -248,6 +263,11 @@ class _State:
     savings: float
     definite: bool
     curved: float
+
+    def rises_by_noise(self, before: "_State", epsilon: float) -> bool:
+        """Whether Newton's step to it, which was to save less than a share of the area, saved none, nor left less."""
+        settled = self.definite and before.definite and before.savings <= epsilon * before.area
+        return settled and self.area >= before.area and self.savings > _GAIN * before.savings
 
 
 class _Film:
