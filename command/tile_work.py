@@ -12,6 +12,8 @@ from .quantities import eigenvector_name, rows_of, written_by
 
 STORE = "store"  # the folder within that of a run
 _PIECE = 1_000_000  # points that are read at once
+_SPAWNED, _TRIMMED = "distributed.nanny.pre-spawn-environ", "MALLOC_TRIM_THRESHOLD_"
+_PROFILED = "distributed.worker.profile.enabled"  # which interrupts the work a hundred times a second
 _PACKAGE = "meshfree-laplacian[scale]"
 
 
@@ -194,6 +196,7 @@ def workers(count, memory, address):
         yield lambda function, many: (function(*given) for given in many)
         return
     try:
+        import dask
         from distributed import Client, LocalCluster, as_completed
     except ImportError as error:
         raise core.PointCloudError(
@@ -201,6 +204,9 @@ def workers(count, memory, address):
         ) from error
     with contextlib.ExitStack() as stack:
         if not address:
+            # Dask has freed memory given back at once, which makes arrays of some megabytes half as slow again.
+            spawned = {name: value for name, value in dask.config.get(_SPAWNED).items() if name != _TRIMMED}
+            stack.enter_context(dask.config.set({_SPAWNED: spawned, _PROFILED: False}))
             cluster = LocalCluster(
                 n_workers=count,
                 threads_per_worker=1,
