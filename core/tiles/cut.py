@@ -16,6 +16,9 @@ from ..types import Bools, Floats, Ints
 
 HALO = 45.0  # spacings, at which all results of a tile are those of the whole cloud to 1e-6, see docs/tiles.md
 
+_DEVIATIONS = 3.0  # by which counts of a sample may be off
+NARROWEST = 3.0  # halos that a tile is wide at least: below, most of the work is in the halos
+
 
 @dataclass(frozen=True, eq=False)
 class Tile:
@@ -89,27 +92,81 @@ def halo_of(options: LaplacianOptions) -> float:
     return HALO * max(1.0, points_in_kernel(options) / ADAPTIVE) ** 0.5
 
 
+class Room:
+    """What a tile may have with its halo, judged by a sample of the cloud.
+
+    Parameters
+    ----------
+    sample : ndarray, (k, 3)
+    share : float
+        How many points of the cloud each of these stands for.
+    halo : float
+        In spacings.
+    most : int
+        Points of the cloud in a tile and its halo.
+    """
+
+    def __init__(self, sample: Floats, share: float, halo: float, most: int) -> None:
+        self._sample, self._halo, self._most = sample, halo, most / share
+        self._spacing = find_nearest(sample).spacing / np.sqrt(share)
+
+    def around(self, own: Ints, others: Ints) -> Ints:
+        """Return those of some other points of the sample that would be in the halo of some, by their rows."""
+        low, high = self._sample[own].min(axis=0), self._sample[own].max(axis=0)
+        usual = np.median(self._spacing[own])
+        away = outside(self._sample[others], low, high) / np.maximum(self._spacing[others], usual)
+        return others[away <= self._halo]
+
+    def is_short(self, own: int, around: int) -> bool:
+        """Whether so many points of the sample may be too many, and fewer would do.
+
+        Where most would be in the halo of whatever part, as where points fill a volume, they would not.
+        """
+        total = own + around
+        return (
+            total * (1.0 + _DEVIATIONS / np.sqrt(own)) > self._most
+            and own > (NARROWEST / (NARROWEST + 2.0)) ** 2 * total
+        )
+
+
 class Plan:
-    """Planes that divide a cloud into tiles, at medians of a sample, each across the longest side."""
+    """Planes that divide a cloud into tiles, at medians of a sample, each across the longest side.
 
-    def __init__(self, sample: Floats, tiles: int) -> None:
+    Attributes
+    ----------
+    tiles : int
+        How many; of points at few places there may be fewer than were asked for.
+    split : int
+        How often a tile was divided once more for want of room.
+    """
+
+    def __init__(self, sample: Floats, tiles: int, room: Room | None = None) -> None:
         self._nodes: list[tuple[int, float, int, int]] = []  # axis, level, and the nodes below and above; ~ of tiles
-        self.tiles = 0
-        self._root = self._divide(sample, tiles)
+        self.tiles, self.split = 0, 0
+        self._sample, self._room = sample, room
+        self._root = self._divide(np.arange(len(sample)), np.arange(0), tiles)
 
-    def _divide(self, sample: Floats, tiles: int) -> int:
+    def _divide(self, own: Ints, others: Ints, tiles: int) -> int:
+        if self._room is not None and len(own):
+            others = self._room.around(own, others)
+            if tiles == 1 and self._room.is_short(len(own), len(others)):
+                self.split += 1
+                tiles = 2
         below = np.zeros(0, dtype=bool)
-        if tiles > 1 and len(sample) > 1:
-            axis = int(np.ptp(sample, axis=0).argmax())
-            place = tiles // 2 * len(sample) // tiles
-            level = float(np.partition(sample[:, axis], place)[place])
-            below = sample[:, axis] < level
+        if tiles > 1 and len(own) > 1:
+            points = self._sample[own]
+            axis = int(np.ptp(points, axis=0).argmax())
+            place = tiles // 2 * len(own) // tiles
+            level = float(np.partition(points[:, axis], place)[place])
+            below = points[:, axis] < level
         if not below.any():
             self.tiles += 1
             return ~(self.tiles - 1)
         node = len(self._nodes)
         self._nodes.append((axis, level, 0, 0))
-        left, right = self._divide(sample[below], tiles // 2), self._divide(sample[~below], tiles - tiles // 2)
+        low, high = own[below], own[~below]
+        left = self._divide(low, np.concatenate([others, high]), tiles // 2)
+        right = self._divide(high, np.concatenate([others, low]), tiles - tiles // 2)
         self._nodes[node] = axis, level, left, right
         return node
 

@@ -18,7 +18,7 @@ from ..geometry import FEW, check_points, spacing_of
 from ..memory import needed_memory
 from ..options import LaplacianOptions
 from ..types import Array, Floats
-from .cut import HALO, Plan, outside
+from .cut import HALO, NARROWEST, Plan, Room, outside
 from .roughness import asked_wavelength
 from .seen import checked_viewpoint, orientation
 from .shelf import Record, Told
@@ -29,9 +29,10 @@ from .survey import DEGREE
 
 Chunks: TypeAlias = Iterable[tuple[Floats, dict[str, Array]]]  # coordinates, and what is told of the points besides
 
+_EACH = 5000  # of these, for each tile, are enough
+_FEW = 8  # of so many tiles, one may be divided once more; where more had to be, all are made smaller
 _SAMPLE = 1 << 20  # points by whose medians the cloud is cut, at least half of them
 _PLACE = "coordinates of the point"  # in rows, beside columns of any names
-_NARROWEST = 3.0  # halos that a tile is wide at least: below, most of the work is in the halos
 
 
 def cut_to_store(
@@ -104,7 +105,8 @@ def cut_to_store(
     place, asked = checked_viewpoint(viewpoint), asked_wavelength(wavelength)
     counted = _count(chunks())
     sides = orientation(orient, place, counted.columns)
-    plan = Plan(counted.sample, -(-counted.count // most))
+    fitting = None if memory is None else memory // needed_memory(1, options)
+    plan = _plan(counted, -(-counted.count // most), halo, fitting)
     building = folder.with_name(f".{folder.name}.part")
     try:
         shutil.rmtree(building, ignore_errors=True)  # of a cut that was killed
@@ -130,7 +132,7 @@ def points_of_tile(memory: int, options: LaplacianOptions, halo: float = HALO) -
         Little more than halos would fit.
     """
     side = np.sqrt(memory / needed_memory(1, options)) - 2.0 * halo
-    least = needed_memory(1, options) * ((_NARROWEST + 2.0) * halo) ** 2
+    least = needed_memory(1, options) * ((NARROWEST + 2.0) * halo) ** 2
     if memory < least:
         raise NotEnoughMemoryError(
             f"A tile with its halo takes {least / 2**30:.1f} GB at least, and {memory / 2**30:.1f} GB are allowed."
@@ -226,6 +228,17 @@ def _spread(chunks: Chunks, folder: Path, plan: Plan, counted: _Counted) -> list
             f"The files held {counted.count:,} points at first and {sum(sizes):,} when read again. Cut them again."
         )
     return sizes
+
+
+def _plan(counted: _Counted, tiles: int, halo: float, fitting: int | None) -> Plan:
+    """Divide a cloud into about so many tiles, or more, so that each has room with its halo."""
+    sample = counted.sample[:: max(1, len(counted.sample) // (_EACH * tiles))]
+    if fitting is None or len(sample) < 2:
+        return Plan(sample, tiles)
+    room = Room(sample, counted.count / len(sample), halo, fitting)
+    while (plan := Plan(sample, tiles, room)).split > plan.tiles // _FEW:
+        tiles += -(-tiles // _FEW)
+    return plan
 
 
 def find_extent(site: Site, state: Any) -> tuple[None, Told]:

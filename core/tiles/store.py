@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import pickle
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import IO, Any
@@ -23,6 +24,7 @@ VERSION = 2
 POINTS, COLUMNS = "points.npy", "columns.npy"
 _MANIFEST, _ERROR = "manifest.json", "error.json"
 _TRUSTED = ("numpy", "scipy", "builtins", "copyreg", __package__.rpartition(".")[0])  # packages of what states hold
+_ALIGNED = 64  # bytes to a multiple of which arrays begin in a state
 _BUILTINS = {"slice", "set", "frozenset", "complex", "bytearray", "range", "object"}
 
 
@@ -160,9 +162,8 @@ class Store:
             return None
         path = before[-1]
         try:
-            with open(path, "rb") as file:
-                return _Reader(file).load()
-        except (OSError, EOFError, pickle.UnpicklingError) as error:
+            return _load_state(path)
+        except (OSError, EOFError, IndexError, ValueError, pickle.UnpicklingError) as error:
             raise PointCloudError(f"{path} cannot be read: {error}. Cut the cloud again.") from error
 
     def put(self, step: str, number: int, told: Told, state: Any) -> None:
@@ -171,8 +172,8 @@ class Store:
         if state is not None:
             place = int(before[-1].stem.split("-")[1]) + 1 if before else 0
             path = self._tile(number) / f"state-{place:02d}-{step}.pickle"
-            with replacing(path) as part, open(part, "wb") as file:
-                pickle.dump(state, file, protocol=pickle.HIGHEST_PROTOCOL)
+            with replacing(path) as part:
+                _save_state(part, state)
         _save(self._path(step, number), told)
         if state is not None:
             for path in before:
@@ -222,11 +223,34 @@ def _save(path: Path, arrays: Any) -> None:
         np.savez(part, **arrays)
 
 
+def _save_state(path: Path, state: Any) -> None:
+    """Write a state: a pickle without what its arrays hold, that, and last where each part of the file begins."""
+    buffers: list[pickle.PickleBuffer] = []
+    pickled = pickle.dumps(state, protocol=5, buffer_callback=buffers.append)
+    parts, begins = [memoryview(pickled), *(buffer.raw() for buffer in buffers)], [0]
+    with open(path, "wb") as file:
+        for part in parts:
+            file.write(part)
+            file.write(bytes(-file.tell() % _ALIGNED))
+            begins += [begins[-1] + len(part), file.tell()]
+        file.write(np.array([*begins[:-1], len(begins) - 1], dtype="<i8").tobytes())
+
+
+def _load_state(path: Path) -> Any:
+    """Read a state, of whose arrays no more is copied to memory than is looked at or changed."""
+    # A file whose data are looked at in place cannot be deleted in Windows.
+    data = np.fromfile(path, np.uint8) if os.name == "nt" else np.memmap(path, np.uint8, mode="c")
+    count = int(data[-8:].view("<i8")[0])
+    begins = data[-8 * (count + 1) : -8].view("<i8").reshape(-1, 2).tolist()
+    pickled, *buffers = (data[begin:end] for begin, end in begins)
+    return _Reader(io.BytesIO(pickled.tobytes()), buffers).load()
+
+
 class _Reader(pickle.Unpickler):
     """Reads states, which hold arrays and classes of this package: anything else is no state."""
 
-    def __init__(self, file: IO[bytes]) -> None:
-        super().__init__(file)
+    def __init__(self, file: IO[bytes], buffers: Iterable[Any]) -> None:
+        super().__init__(file, buffers=buffers)
 
     def find_class(self, module: str, name: str) -> Any:
         """Return a class that a state may hold."""

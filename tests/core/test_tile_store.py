@@ -228,6 +228,20 @@ class TestCut:
         with pytest.raises(core.PointCloudError, match="when read again"):
             core.tiles.cut_to_store(lambda: [(rod()[: next(counts)], {})], tmp_path / "store", 800)
 
+    def test_leaves_room_for_halos(self, tmp_path):
+        side, fitting, halo = 60, 1100, 5.0  # four tiles of 900 points would have 1225 with their halos
+        points = np.stack(np.meshgrid(*2 * [np.arange(side, dtype=float)], [0.0]), axis=-1).reshape(-1, 3)
+        points += 0.1 * np.random.default_rng(0).normal(size=points.shape)
+        memory = core.memory.needed_memory(fitting, core.LaplacianOptions())
+        store = core.tiles.cut_to_store(lambda: [(points, {})], tmp_path / "store", 900, halo=halo, memory=memory)
+        while (waiting := core.tiles.pending(store))[0].name in ("extent", "halo"):
+            for number in waiting[1]:
+                core.tiles.visit_tile(store.folder, waiting[0].name, number)
+            core.tiles.settle(store)
+        assert 4 < store.count <= 8
+        assert len(store.alive) == store.count
+        assert max(len(store.part(number).points) for number in range(store.count)) <= fitting
+
     def test_needs_memory_for_more_than_halos(self):
         options = core.LaplacianOptions()
         most = core.tiles.points_of_tile(2 << 30, options)
@@ -269,15 +283,13 @@ def test_no_store(tmp_path):
 
 
 def test_a_state_that_calls_something_is_refused(measured, tmp_path):
-    import pickle
-
     class Calls:
         def __reduce__(self):
             return os.mkdir, (str(tmp_path / "called"),)
 
     shutil.copytree(measured.folder, tmp_path / "store")
     store = core.tiles.Store(tmp_path / "store")
-    (store.folder / "000000" / "state-00-x.pickle").write_bytes(pickle.dumps(Calls()))
+    store.put("x", 0, {}, Calls())
     with pytest.raises(core.PointCloudError, match="no part of a state"):
         store.state("measure", 0)
     assert not (tmp_path / "called").exists()
