@@ -18,6 +18,7 @@ HALO = 45.0  # spacings, at which all results of a tile are those of the whole c
 
 _DEVIATIONS = 3.0  # by which counts of a sample may be off
 NARROWEST = 3.0  # halos that a tile is wide at least: below, most of the work is in the halos
+_NARROW = (NARROWEST / (NARROWEST + 2.0)) ** 2  # share of the points of a tile and its halo that are its own then
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,16 +118,18 @@ class Room:
         away = outside(self._sample[others], low, high) / np.maximum(self._spacing[others], usual)
         return others[away <= self._halo]
 
-    def is_short(self, own: int, around: int) -> bool:
-        """Whether so many points of the sample may be too many, and fewer would do.
+    def is_full(self, own: int, around: int) -> bool:
+        """Whether so many points of the sample may be too many."""
+        return (own + around) * (1.0 + _DEVIATIONS / np.sqrt(own)) > self._most
 
-        Where most would be in the halo of whatever part, as where points fill a volume, they would not.
-        """
-        total = own + around
-        return (
-            total * (1.0 + _DEVIATIONS / np.sqrt(own)) > self._most
-            and own > (NARROWEST / (NARROWEST + 2.0)) ** 2 * total
-        )
+    def gap(self, own: Ints) -> tuple[int, float] | None:
+        """Return the axis and the level at which points fall apart farther than halos reach; None if they do not."""
+        points = np.sort(self._sample[own], axis=0)
+        widths = np.diff(points, axis=0)
+        if not len(widths) or widths.max() <= self._halo * np.median(self._spacing[own]):
+            return None
+        row, axis = np.unravel_index(widths.argmax(), widths.shape)
+        return int(axis), float(points[row + 1, axis])
 
 
 class Plan:
@@ -147,28 +150,40 @@ class Plan:
         self._root = self._divide(np.arange(len(sample)), np.arange(0), tiles)
 
     def _divide(self, own: Ints, others: Ints, tiles: int) -> int:
+        gap = None
         if self._room is not None and len(own):
             others = self._room.around(own, others)
-            if tiles == 1 and self._room.is_short(len(own), len(others)):
-                self.split += 1
-                tiles = 2
-        below = np.zeros(0, dtype=bool)
-        if tiles > 1 and len(own) > 1:
+            if tiles == 1 and self._room.is_full(len(own), len(others)):
+                gap = self._room.gap(own)
+                # Where most would be in the halo of whatever part, as where points fill a volume, parts do not help.
+                if gap is None and len(own) > _NARROW * (len(own) + len(others)):
+                    self.split += 1
+                    tiles = 2
+        if gap is not None:
+            axis, level = gap
+            parts = 1, 1
+        elif tiles > 1 and len(own) > 1:
             points = self._sample[own]
             axis = int(np.ptp(points, axis=0).argmax())
             place = tiles // 2 * len(own) // tiles
             level = float(np.partition(points[:, axis], place)[place])
-            below = points[:, axis] < level
+            parts = tiles // 2, tiles - tiles // 2
+        else:
+            return self._leaf()
+        below = self._sample[own, axis] < level
         if not below.any():
-            self.tiles += 1
-            return ~(self.tiles - 1)
+            return self._leaf()
         node = len(self._nodes)
         self._nodes.append((axis, level, 0, 0))
         low, high = own[below], own[~below]
-        left = self._divide(low, np.concatenate([others, high]), tiles // 2)
-        right = self._divide(high, np.concatenate([others, low]), tiles - tiles // 2)
+        left = self._divide(low, np.concatenate([others, high]), parts[0])
+        right = self._divide(high, np.concatenate([others, low]), parts[1])
         self._nodes[node] = axis, level, left, right
         return node
+
+    def _leaf(self) -> int:
+        self.tiles += 1
+        return ~(self.tiles - 1)
 
     def tile(self, points: Floats) -> Ints:
         """Return the tile of each point, (k,)."""

@@ -242,6 +242,16 @@ class TestCut:
         assert len(store.alive) == store.count
         assert max(len(store.part(number).points) for number in range(store.count)) <= fitting
 
+    def test_parts_from_what_fills_a_volume_what_is_apart(self, tmp_path):
+        rng = np.random.default_rng(0)
+        points = np.concatenate([rod(), rng.random((9000, 3)) + [50.0, 0.0, 0.0], np.eye(3) + [90.0, 0.0, 0.0]])
+        memory = core.memory.needed_memory(5000, core.LaplacianOptions())
+        store = core.tiles.cut_to_store(lambda: [(points, {})], tmp_path / "store", 4500, halo=20.0, memory=memory)
+        core.tiles.run_steps(store)
+        assert sum(len(store.own(number)) for number in store.alive) == COUNT
+        errors = {store.error(number).split(":")[0] for number in range(store.count) if number not in store.alive}
+        assert len(errors) >= 2
+
     def test_needs_memory_for_more_than_halos(self):
         options = core.LaplacianOptions()
         most = core.tiles.points_of_tile(2 << 30, options)
