@@ -129,7 +129,7 @@ class Room:
         if not len(widths) or widths.max() <= self._halo * np.median(self._spacing[own]):
             return None
         row, axis = np.unravel_index(widths.argmax(), widths.shape)
-        return int(axis), float(points[row + 1, axis])
+        return int(axis), float(points[row : row + 2, axis].mean())  # beyond points that are not in the sample
 
 
 class Plan:
