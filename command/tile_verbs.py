@@ -259,7 +259,7 @@ class TilesMeasure(_Stage):
         number, count = arguments.tiles
         measured = [tile for tile in store.alive if store.done("measure", tile)]
         mine = [tile for tile in measured if tile % count == number - 1]
-        _write(store, path, mine, arguments, lambda function, many: (function(*given) for given in many))
+        _write(store, path, mine, arguments, tile_work.one_by_one)
         return {**found, "notices": []}
 
 
@@ -342,10 +342,8 @@ def _finish(store, arguments):
 
 def _report(store, folder, arguments):
     """Write the report of all tiles, a line of JSON for each, and return the totals with the errors."""
-    records, files = (
-        tile_work.tile_records(store, folder, tile_choices.ending(arguments)),
-        tile_work.file_records(store),
-    )
+    records = tile_work.tile_records(store, folder, tile_choices.ending(arguments))
+    files = tile_work.file_records(store)
     shared = {"verb": "tiles run", "settings": store.manifest["options"], "stamps": {}, "ended": round(time.time(), 3)}
     lines = [{"path": record["file"], **shared, **record} for record in [*files, *records]]
     write_text(folder / _REPORT, "".join(f"{json.dumps(line)}\n" for line in lines))

@@ -174,6 +174,11 @@ def doubts(store):
     ]
 
 
+def one_by_one(function, many):
+    """Call a function with each of some arguments in this process, and yield its results."""
+    return (function(*given) for given in many)
+
+
 @contextlib.contextmanager
 def workers(count, memory, address):
     """Provide a function that calls another with a folder, and each of some arguments, on all workers.
@@ -193,7 +198,7 @@ def workers(count, memory, address):
         Takes a function and tuples of arguments, and yields its results as they come.
     """
     if count == 1 and not address:
-        yield lambda function, many: (function(*given) for given in many)
+        yield one_by_one
         return
     try:
         import dask

@@ -114,8 +114,8 @@ class Room:
     def around(self, own: Ints, others: Ints) -> Ints:
         """Return those of some other points of the sample that would be in the halo of some, by their rows."""
         low, high = self._sample[own].min(axis=0), self._sample[own].max(axis=0)
-        usual = np.median(self._spacing[own])
-        away = outside(self._sample[others], low, high) / np.maximum(self._spacing[others], usual)
+        usual = float(np.median(self._spacing[own]))
+        away = spacings_outside(self._sample[others], self._spacing[others], low, high, usual)
         return others[away <= self._halo]
 
     def is_full(self, own: int, around: int) -> bool:
@@ -206,9 +206,14 @@ def outside(points: Floats, low: Floats, high: Floats) -> Floats:
     return distance
 
 
+def spacings_outside(points: Floats, spacing: Floats, low: Floats, high: Floats, usual: float) -> Floats:
+    """Return how far points, (k, 3), are outside a box, (k,), in their spacings, or the usual one there if wider."""
+    return outside(points, low, high) / np.maximum(np.maximum(spacing, usual), np.finfo(float).tiny)
+
+
 def _with_halo(points: Floats, spacing: Floats, own: Ints, halo: float) -> Tile:
-    distance = outside(points, points[own].min(axis=0), points[own].max(axis=0))
-    away = distance / np.maximum(spacing, np.median(spacing[own]))  # in spacings
+    low, high = points[own].min(axis=0), points[own].max(axis=0)
+    away = spacings_outside(points, spacing, low, high, float(np.median(spacing[own])))
     away[own] = 0.0
     inner = np.zeros(len(points), dtype=bool)
     inner[own] = True

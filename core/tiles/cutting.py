@@ -18,7 +18,7 @@ from ..geometry import FEW, check_points, spacing_of
 from ..memory import needed_memory
 from ..options import LaplacianOptions
 from ..types import Array, Floats
-from .cut import HALO, NARROWEST, Plan, Room, outside
+from .cut import HALO, NARROWEST, Plan, Room, spacings_outside
 from .roughness import asked_wavelength
 from .seen import checked_viewpoint, orientation
 from .shelf import Record, Told
@@ -271,9 +271,7 @@ def find_halo(site: Site, state: Any) -> tuple[None, Told]:
     near[number] = False
     for other in np.flatnonzero(near).tolist():
         points = shelf.own(other)
-        away = outside(points, low, high) / np.maximum(
-            np.maximum(shelf.read("extent", other, "spacing"), usual), 1e-300
-        )
+        away = spacings_outside(points, shelf.read("extent", other, "spacing"), low, high, usual)
         place = np.flatnonzero(away <= halo)
         count += len(place)
         if memory is not None and needed_memory(count, site.options) > memory:

@@ -137,8 +137,7 @@ def agree_on_areas(shelf: Shelf, options: LaplacianOptions) -> Record:
 
 def share_weights(site: Site, state: object) -> tuple[None, Told]:
     """Balance the weights of the points around the center, for what each round takes from the earlier ones."""
-    middle = points_around(site.shelf, site.record["center"], 1).points[0]
-    part = points_around(site.shelf, middle, _TRIAL)
+    part = points_around(site.shelf, site.record["center"], _TRIAL)
     trial = build_laplacian(part.points, options=site.options, agreed=Site(site.shelf, -1, site.options, part).agreed())
     shares = trial.agreed.shares or ()
     flat = np.array([share for step in shares for share in step], dtype=float)

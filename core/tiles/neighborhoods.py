@@ -154,9 +154,8 @@ def agree_on_noise(shelf: Shelf, options: LaplacianOptions) -> Record:
 
 def find_filling(site: Site, state: object) -> tuple[None, Told]:
     """Follow how points that fill volumes fare as noise is smoothed, around the one next to the middle of all."""
-    shelf = site.shelf
-    middle = points_around(shelf, site.record["filled"], 1, "fills").points[0]
-    trial = Site(shelf, -1, site.options, points_around(shelf, middle, _FILLED))
+    around = points_around(site.shelf, site.record["filled"], _FILLED, "fills")
+    trial = Site(site.shelf, -1, site.options, around)
     sample, _ = find_spacing(trial, None)
     left, _ = find_reach(trial, sample)
     fitted, _ = find_noise(trial, left or sample)

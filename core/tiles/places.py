@@ -10,16 +10,22 @@ from .shelf import Part, Shelf
 
 
 def points_around(shelf: Shelf, place: Floats, count: int, marked: str = "") -> Part:
-    """Return so many points of all tiles that are next to a place, nearest first.
+    """Return so many points of all tiles that are next to the one at a place, nearest first.
 
     Parameters
     ----------
     shelf : Shelf
     place : ndarray, (3,)
+        The point next to it is the middle.
     count : int
     marked : str
-        Only those that the step "noise" has marked under this name.
+        The middle is one of those that the step "noise" has marked under this name.
     """
+    return _nearest(shelf, _nearest(shelf, place, 1, marked).points[0], count)
+
+
+def _nearest(shelf: Shelf, place: Floats, count: int, marked: str = "") -> Part:
+    """Return so many points that are next to a place, nearest first; only marked ones where a name is given."""
     found = np.zeros((0, 6))
     away = {number: float(outside(place[None], *shelf.bounds(number))[0]) for number in shelf.alive}
     for number in sorted(away, key=lambda number: away[number]):
