@@ -6,16 +6,19 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
 
 from ..arguments import real, whole
+from ..cores import cores
 from ..errors import InvalidPointsError
-from ..geometry import check_points, find_nearest
+from ..geometry import FEW, check_points, spacing_of
 from ..memory import ADAPTIVE, points_in_kernel
 from ..options import LaplacianOptions
 from ..types import Bools, Floats, Ints
 
 HALO = 45.0  # spacings, at which all results of a tile are those of the whole cloud to 1e-6, see docs/tiles.md
 
+_ROUNDS = 2  # in which spacings are averaged
 _DEVIATIONS = 3.0  # by which counts of a sample may be off
 NARROWEST = 3.0  # halos that a tile is wide at least: below, most of the work is in the halos
 _NARROW = (NARROWEST / (NARROWEST + 2.0)) ** 2  # share of the points of a tile and its halo that are its own then
@@ -55,7 +58,7 @@ def cut(points: ArrayLike, count: int, halo: float = HALO) -> list[Tile]:
     count : int
         How many tiles.
     halo : float
-        Width of the halos, in spacings of the points in them, and at least of those in the box.
+        How far points in them are from the nearest in the box, in the spacing around them, and at least that in the box.
 
     Returns
     -------
@@ -81,7 +84,7 @@ def cut(points: ArrayLike, count: int, halo: float = HALO) -> list[Tile]:
         )
     if not real(halo) >= 0.0:
         raise InvalidPointsError(f"A halo of {halo!r} spacings. Use a number that is not negative.")
-    spacing = find_nearest(points).spacing
+    spacing = spacing_around(points)
     plan = Plan(points, int(count))
     tile = plan.tile(points)
     order, ends = np.argsort(tile, kind="stable"), np.cumsum(np.bincount(tile, minlength=plan.tiles))
@@ -109,14 +112,14 @@ class Room:
 
     def __init__(self, sample: Floats, share: float, halo: float, most: int) -> None:
         self._sample, self._halo, self._most = sample, halo, most / share
-        self._spacing = find_nearest(sample).spacing / np.sqrt(share)
+        self._between = 0.5 * np.sqrt(share)  # how much farther the next point of the sample is than that of the cloud
+        self._spacing = spacing_around(sample) / np.sqrt(share)
 
     def around(self, own: Ints, others: Ints) -> Ints:
         """Return those of some other points of the sample that would be in the halo of some, by their rows."""
-        low, high = self._sample[own].min(axis=0), self._sample[own].max(axis=0)
-        usual = float(np.median(self._spacing[own]))
-        away = spacings_outside(self._sample[others], self._spacing[others], low, high, usual)
-        return others[away <= self._halo]
+        tree, usual = cKDTree(self._sample[own]), float(np.median(self._spacing[own]))
+        reach = self._halo + self._between
+        return others[spacings_away(tree, usual, self._sample[others], self._spacing[others], reach)[0]]
 
     def is_full(self, own: int, around: int) -> bool:
         """Whether so many points of the sample may be too many."""
@@ -200,6 +203,18 @@ class Plan:
         return result
 
 
+def spacing_around(points: Floats) -> Floats:
+    """Return the spacing of the points around each, (k,): of random points, one's own says little."""
+    count = min(FEW + 1, len(points))
+    if count < 2:
+        return np.zeros(len(points))
+    distance, index = cKDTree(points).query(points, k=count, workers=cores())
+    spacing = spacing_of(distance)
+    for _ in range(_ROUNDS):
+        spacing = spacing[index].mean(axis=1)
+    return spacing
+
+
 def outside(points: Floats, low: Floats, high: Floats) -> Floats:
     """Return how far points, (k, 3), are outside a box, (k,)."""
     distance: Floats = np.linalg.norm(np.maximum(np.maximum(low - points, points - high), 0.0), axis=1)
@@ -211,11 +226,43 @@ def spacings_outside(points: Floats, spacing: Floats, low: Floats, high: Floats,
     return outside(points, low, high) / np.maximum(np.maximum(spacing, usual), np.finfo(float).tiny)
 
 
+def spacings_away(tree: cKDTree, usual: float, points: Floats, spacing: Floats, halo: float) -> tuple[Ints, Floats]:
+    """Find which points are in the halo of others, and how far from these.
+
+    Parameters
+    ----------
+    tree : cKDTree
+        Of the others.
+    usual : float
+        Their spacing.
+    points : ndarray, (k, 3)
+    spacing : ndarray, (k,)
+        Around these.
+    halo : float
+        In spacings.
+
+    Returns
+    -------
+    rows : ndarray, (m,) int
+        Which of the points, ascending.
+    away : ndarray, (m,)
+        How far, in their spacings or the usual one of the others if wider.
+    """
+    near = np.flatnonzero(spacings_outside(points, spacing, tree.mins, tree.maxes, usual) <= halo)
+    distance = tree.query(points[near], workers=cores())[0]
+    away = distance / np.maximum(np.maximum(spacing[near], usual), np.finfo(float).tiny)
+    within = away <= halo
+    return near[within], away[within]
+
+
 def _with_halo(points: Floats, spacing: Floats, own: Ints, halo: float) -> Tile:
-    low, high = points[own].min(axis=0), points[own].max(axis=0)
-    away = spacings_outside(points, spacing, low, high, float(np.median(spacing[own])))
-    away[own] = 0.0
     inner = np.zeros(len(points), dtype=bool)
     inner[own] = True
-    rows = np.flatnonzero(away <= halo)
-    return Tile(rows, inner[rows], away[rows] <= 0.5 * halo)
+    others = np.flatnonzero(~inner)
+    found, away = spacings_away(
+        cKDTree(points[own]), float(np.median(spacing[own])), points[others], spacing[others], halo
+    )
+    close = inner.copy()
+    close[others[found[away <= 0.5 * halo]]] = True
+    rows = np.sort(np.concatenate([own, others[found]]))
+    return Tile(rows, inner[rows], close[rows])

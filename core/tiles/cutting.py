@@ -14,11 +14,11 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from ..errors import InvalidPointsError, NotEnoughMemoryError, PointCloudError, TooFewPointsError
-from ..geometry import FEW, check_points, spacing_of
+from ..geometry import check_points
 from ..memory import needed_memory
 from ..options import LaplacianOptions
 from ..types import Array, Floats
-from .cut import HALO, NARROWEST, Plan, Room, spacings_outside
+from .cut import HALO, NARROWEST, Plan, Room, spacing_around, spacings_away
 from .roughness import asked_wavelength
 from .seen import checked_viewpoint, orientation
 from .shelf import Record, Told
@@ -247,8 +247,7 @@ def find_extent(site: Site, state: Any) -> tuple[None, Told]:
     if not len(points):
         raise TooFewPointsError("The tile has no points.")
     points = check_points(points)
-    distance = cKDTree(points).query(points, k=min(FEW + 1, len(points)))[0].reshape(len(points), -1)
-    spacing = spacing_of(distance) if len(points) > 1 else np.zeros(1)
+    spacing = spacing_around(points)
     return None, {
         "low": points.min(axis=0),
         "high": points.max(axis=0),
@@ -264,15 +263,15 @@ def find_halo(site: Site, state: Any) -> tuple[None, Told]:
     assert isinstance(shelf, Store)
     halo, memory = shelf.manifest["halo"], shelf.manifest["memory"]
     low, high = shelf.bounds(number)
-    usual, count = float(site.told("extent", "usual")), len(shelf.own(number))
+    tree, usual = cKDTree(shelf.own(number)), float(site.told("extent", "usual"))
+    count = tree.n
     found = [(np.zeros((0, 3)), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=bool))]
     gap = np.maximum(np.maximum(low - shelf.record["high"], shelf.record["low"] - high), 0.0)
     near = np.linalg.norm(gap, axis=1) <= halo * np.maximum(usual, shelf.record["widest"])  # not where there is none
     near[number] = False
     for other in np.flatnonzero(near).tolist():
         points = shelf.own(other)
-        away = spacings_outside(points, shelf.read("extent", other, "spacing"), low, high, usual)
-        place = np.flatnonzero(away <= halo)
+        place, away = spacings_away(tree, usual, points, shelf.read("extent", other, "spacing"), halo)
         count += len(place)
         if memory is not None and needed_memory(count, site.options) > memory:
             raise NotEnoughMemoryError(
@@ -280,7 +279,7 @@ def find_halo(site: Site, state: Any) -> tuple[None, Told]:
                 f" {memory / 2**30:.1f} GB that are allowed: its points fill a volume, or lie in heaps. Thin them out"
                 " there, or allow more memory."
             )
-        found.append((points[place], np.full(len(place), other), place, away[place] <= 0.5 * halo))
+        found.append((points[place], np.full(len(place), other), place, away <= 0.5 * halo))
     names = ("points", "owner", "place", "close")
     return None, {name: np.concatenate(column) for name, column in zip(names, zip(*found, strict=True), strict=True)}
 

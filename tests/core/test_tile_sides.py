@@ -21,7 +21,7 @@ def sheet():
 
 def sides(points, count, **choice):
     tiles = core.tiles.cut(points, count, 20.0)
-    return core.tiles.survey(points, tiles, degree=12, **choice).side
+    return core.tiles.survey(points, tiles, **choice).side
 
 
 SPHERES = {
@@ -58,7 +58,7 @@ def test_of_bodies_is_decided_one_by_one():
 
 
 def stored(folder, pieces, **choice):
-    return core.tiles.cut_to_store(lambda: pieces, folder / "store", 500, degree=12, halo=20.0, **choice)
+    return core.tiles.cut_to_store(lambda: pieces, folder / "store", 500, halo=20.0, **choice)
 
 
 def test_by_scanners_is_told_by_the_files(tmp_path):

@@ -16,7 +16,6 @@ import core
 from benchmarks.samplings import fibonacci_sphere
 from core.tiles.medians import median
 
-HALO, DEGREE = 45.0, 12  # as in the tests of tiles in memory
 LENGTH, RADIUS, COUNT = 12.0, 0.125, 3000
 
 
@@ -38,7 +37,7 @@ def stored(folder, points, most, pieces=3, **choice):
     def chunks():
         return ((points[part], {name: values[part] for name, values in columns.items()}) for part in parts)
 
-    return core.tiles.cut_to_store(chunks, folder / "store", most, halo=HALO, degree=DEGREE, **choice)
+    return core.tiles.cut_to_store(chunks, folder / "store", most, **choice)
 
 
 def joined(store, name):
@@ -63,7 +62,7 @@ def measured(walk):
 
 @cache
 def whole():
-    return core.build_laplacian(rod(), agreed=core.geometry.Agreed(degree=DEGREE))
+    return core.build_laplacian(rod(), agreed=core.geometry.Agreed(degree=core.tiles.DEGREE))
 
 
 def same(found, wanted, rtol=1e-5):
@@ -103,10 +102,10 @@ class TestStore:
     def test_gives_the_roughness_of_the_whole(self, measured):
         length = float(np.median(whole().smoothing_lengths))
         assert abs(measured.record["wavelength"] / (9.0 * length) - 1.0) < 1e-9
-        same(joined(measured, core.tiles.ROUGHNESS), core.roughness(whole()), 1e-6)
-        assert core.tiles.doubted_wavelength(measured.record, HALO) is None
+        same(joined(measured, core.tiles.ROUGHNESS), core.roughness(whole()))
+        assert core.tiles.doubted_wavelength(measured.record, core.tiles.HALO) is None
         longer = {**measured.record, "wavelength": np.array(40.0 * length)}
-        wavelength, share = core.tiles.doubted_wavelength(longer, HALO)
+        wavelength, share = core.tiles.doubted_wavelength(longer, core.tiles.HALO)
         assert wavelength == 40.0 * length
         assert 0.01 < share < 1.0
 

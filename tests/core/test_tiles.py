@@ -6,18 +6,19 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy import sparse
+from scipy.spatial import cKDTree
 
 import core
 from core.geometry import Agreed, find_nearest
 from core.geometry.boundary import no_boundary
 from core.geometry.moments import least_error
+from core.tiles.cut import spacing_around
 from core.tiles.labels import agree_on_signs
 
 COUNT = 4000
 LENGTH, RADIUS = 12.0, 0.125  # of rods so long that tiles with halos are two thirds of them
 SPACING = np.sqrt(2.0 * np.pi * RADIUS * LENGTH / COUNT)
-LOW = Agreed(degree=12)  # reaches less far than the halos of these few points
-HALO = 45.0
+LOW = Agreed(degree=core.tiles.DEGREE)
 KINDS = ("noisy", "several")
 
 
@@ -51,12 +52,12 @@ def whole(kind):
 
 @cache
 def tiles(kind):
-    return core.tiles.cut(rods(kind), 4, HALO)
+    return core.tiles.cut(rods(kind), 4, core.tiles.HALO)
 
 
 @cache
 def surveyed(kind):
-    return core.tiles.survey(rods(kind), tiles(kind), degree=LOW.degree)
+    return core.tiles.survey(rods(kind), tiles(kind))
 
 
 def joined(points, parts, agreed):
@@ -115,12 +116,30 @@ class TestAgreed:
         np.testing.assert_array_equal(some.component, [1, 3, 4])
 
 
+def test_spacing_is_even_around_random_points():
+    points = np.pad(np.random.default_rng(0).random((4000, 2)), ((0, 0), (0, 1)))
+    inner = np.abs(points[:, :2] - 0.5).max(axis=1) < 0.4
+    around, own = spacing_around(points)[inner] * 4000**0.5, find_nearest(points).spacing[inner] * 4000**0.5
+    assert abs(around.mean() - 1.0) < 0.05
+    assert around.std() < 0.75 * own.std()
+    np.testing.assert_array_equal(spacing_around(points[:1]), [0.0])
+
+
 class TestTiles:
     @pytest.mark.parametrize("kind", KINDS)
     def test_divide_the_points(self, kind):
         own = np.concatenate([tile.own for tile in tiles(kind)])
         np.testing.assert_array_equal(np.sort(own), np.arange(len(rods(kind))))
         assert max(len(tile.rows) for tile in tiles(kind)) < 0.8 * len(rods(kind))
+
+    def test_have_halos_of_the_points_near_their_own(self):
+        points, halo = rods("several"), 10.0
+        spacing = spacing_around(points)
+        for tile in core.tiles.cut(points, 4, halo):
+            distance = cKDTree(points[tile.own]).query(points)[0]
+            away = distance / np.maximum(spacing, np.median(spacing[tile.own]))
+            np.testing.assert_array_equal(tile.rows, np.flatnonzero(away <= halo))
+            np.testing.assert_array_equal(tile.close, away[tile.rows] <= 0.5 * halo)
 
     def test_hold_points_at_one_place_together(self):
         points = np.repeat(np.random.default_rng(0).random((50, 3)), 3, axis=0)
@@ -154,8 +173,8 @@ class TestSurvey:
     def test_does_not_depend_on_the_cut(self):
         points = rods("several")
         turned = points @ np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
-        other = core.tiles.cut(turned, 3, HALO)
-        found, known = core.tiles.survey(points, other, degree=LOW.degree), surveyed("several")
+        other = core.tiles.cut(turned, 3, core.tiles.HALO)
+        found, known = core.tiles.survey(points, other), surveyed("several")
         np.testing.assert_allclose(found.ratio, known.ratio, rtol=1e-6)
         same(np.concatenate(found.shares), np.concatenate(known.shares), 1e-6)
         np.testing.assert_array_equal(found.sheet, known.sheet)
@@ -200,7 +219,7 @@ def test_sides_where_sheets_come_close_are_those_of_the_whole():
     rng = np.random.default_rng(1)
     along, angle = rng.uniform(0.0, LENGTH, 3000), rng.uniform(0.0, 2.0 * np.pi, 3000)
     points = np.column_stack([along, 0.25 * np.cos(angle), 0.05 * np.sin(angle)])  # a flat tube
-    found = core.tiles.survey(points, core.tiles.cut(points, 4, HALO)).side
+    found = core.tiles.survey(points, core.tiles.cut(points, 4, core.tiles.HALO)).side
     wanted = core.build_laplacian(points, agreed=LOW).agreed
     on = wanted.component >= 0
     assert np.mean(on) > 0.99
@@ -218,8 +237,8 @@ def test_one_smoothing_length_is_that_of_the_whole():
     options = core.LaplacianOptions(bandwidth="global", neighbors=30, bandwidth_factor=0.5)
     points = rods("several")[3000:]  # a quarter of the long one, and all else
     laplacian = core.build_laplacian(points, options=options, agreed=LOW)
-    parts = core.tiles.cut(points, 2, HALO)
-    agreed = core.tiles.survey(points, parts, options, degree=LOW.degree)
+    parts = core.tiles.cut(points, 2, core.tiles.HALO)
+    agreed = core.tiles.survey(points, parts, options)
     np.testing.assert_allclose(agreed.length, laplacian.agreed.length, rtol=1e-12)
     found = [core.tiles.measure_tile(points, tile, agreed, options) for tile in parts]
     for name in ("areas", "mean_curvature"):
