@@ -58,7 +58,7 @@ def cut(points: ArrayLike, count: int, halo: float = HALO) -> list[Tile]:
     count : int
         How many tiles.
     halo : float
-        How far points in them are from the nearest in the box, in the spacing around them, and at least that in the box.
+        How far points in them are from the nearest in the box, in spacings around them, and at least of those in it.
 
     Returns
     -------
