@@ -265,7 +265,9 @@ def find_halo(site: Site, state: Any) -> tuple[None, Told]:
     low, high = shelf.bounds(number)
     tree, usual = cKDTree(shelf.own(number)), float(site.told("extent", "usual"))
     count = tree.n
-    found = [(np.zeros((0, 3)), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=bool))]
+    found: list[tuple[Array, ...]] = [
+        (np.zeros((0, 3)), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=bool))
+    ]
     gap = np.maximum(np.maximum(low - shelf.record["high"], shelf.record["low"] - high), 0.0)
     near = np.linalg.norm(gap, axis=1) <= halo * np.maximum(usual, shelf.record["widest"])  # not where there is none
     near[number] = False
