@@ -16,7 +16,7 @@ from ..memory import ADAPTIVE, points_in_kernel
 from ..options import LaplacianOptions
 from ..types import Bools, Floats, Ints
 
-HALO = 45.0  # spacings, at which all results of a tile are those of the whole cloud to 1e-6, see docs/tiles.md
+HALO = 47.0  # spacings, at which all results of a tile are those of the whole cloud to 1e-6, see docs/tiles.md
 
 _ROUNDS = 2  # in which spacings are averaged
 _DEVIATIONS = 3.0  # by which counts of a sample may be off
