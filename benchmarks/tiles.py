@@ -112,7 +112,7 @@ def zoo(count=100_000, tiles=4, halo=core.tiles.HALO, degree=core.tiles.DEGREE):
 
 def store(count=1_000_000, most=250_000, halo=core.tiles.HALO, degree=core.tiles.DEGREE, folder=""):
     """Measure what tiles on disk cost."""
-    count, most, before = int(count), int(most), whole_seconds()
+    count, most, alone = int(count), int(most), whole_seconds()
     with tempfile.TemporaryDirectory() as temporary:
         place = Path(folder or temporary) / "store"
         began = time.process_time()
@@ -142,12 +142,12 @@ def store(count=1_000_000, most=250_000, halo=core.tiles.HALO, degree=core.tiles
     print(f"{count:,} points in {tiles.count} tiles, with halos {around / within:.2f} times as many")
     print("  CPU seconds:", ", ".join(f"{name} {value:.1f}" for name, value in {"cut": cut, **steps}.items()))
     print(f"  most memory {memory:.2f} GB, on disk {disk / count:.0f} bytes a point, at the end {final / count:.0f}")
-    beside_whole(count, cut + spent, before)
+    beside_whole(count, cut + spent, alone)
 
 
 def run(count=5_000_000, workers=2, memory="2GB", most=0, folder=""):
     """Measure what `tiles run` costs with several workers."""
-    count, most, before = int(count), int(most), whole_seconds()
+    count, most, alone = int(count), int(most), whole_seconds()
     with tempfile.TemporaryDirectory() as temporary:
         place = Path(folder or temporary)
         source, out = place / "points.npy", place / "out"
@@ -174,7 +174,7 @@ def run(count=5_000_000, workers=2, memory="2GB", most=0, folder=""):
     )
     print(f"  CPU seconds {seconds:.0f}, of these in tiles {told['cpu_seconds']:.0f}; area {told['total_area']:.9g}")
     print("  most memory of the program, and of each worker:", [f"{size / 2**30:.2f} GB" for size in used.values()])
-    beside_whole(count, seconds, before)
+    beside_whole(count, seconds, alone)
 
 
 def memory_used(pid):
@@ -198,12 +198,12 @@ def whole_seconds():
     return (time.process_time() - began) / WHOLE
 
 
-def beside_whole(count, seconds, before):
-    """Print CPU time a point, and that of a whole cloud, before and now."""
+def beside_whole(count, seconds, alone):
+    """Print CPU time a point, and that of a whole cloud, before the run and after it."""
     each, after = seconds / count, whole_seconds()
     print(
-        f"  CPU microseconds a point: tiles {1e6 * each:.0f}, whole of {WHOLE:,} {1e6 * before:.0f} before and"
-        f" {1e6 * after:.0f} after, ratio {2.0 * each / (before + after):.2f} (target 1.6)",
+        f"  CPU microseconds a point: tiles {1e6 * each:.0f}, whole of {WHOLE:,} {1e6 * alone:.0f} before and"
+        f" {1e6 * after:.0f} after, ratio {2.0 * each / (alone + after):.2f} (target 1.6)",
         flush=True,
     )
 
