@@ -16,7 +16,7 @@ from ..memory import ADAPTIVE, points_in_kernel
 from ..options import LaplacianOptions
 from ..types import Bools, Floats, Ints
 
-HALO = 47.0  # spacings, at which all results of a tile are those of the whole cloud to 1e-6, see docs/tiles.md
+HALO = 48.0  # spacings, at which all results of a tile are those of the whole cloud to 1e-6, see docs/tiles.md
 
 _ROUNDS = 2  # in which spacings are averaged
 _DEVIATIONS = 3.0  # by which counts of a sample may be off
@@ -221,11 +221,6 @@ def outside(points: Floats, low: Floats, high: Floats) -> Floats:
     return distance
 
 
-def spacings_outside(points: Floats, spacing: Floats, low: Floats, high: Floats, usual: float) -> Floats:
-    """Return how far points, (k, 3), are outside a box, (k,), in their spacings, or the usual one there if wider."""
-    return outside(points, low, high) / np.maximum(np.maximum(spacing, usual), np.finfo(float).tiny)
-
-
 def spacings_away(tree: cKDTree, usual: float, points: Floats, spacing: Floats, halo: float) -> tuple[Ints, Floats]:
     """Find which points are in the halo of others, and how far from these.
 
@@ -248,9 +243,9 @@ def spacings_away(tree: cKDTree, usual: float, points: Floats, spacing: Floats, 
     away : ndarray, (m,)
         How far, in their spacings or the usual one of the others if wider.
     """
-    near = np.flatnonzero(spacings_outside(points, spacing, tree.mins, tree.maxes, usual) <= halo)
-    distance = tree.query(points[near], workers=cores())[0]
-    away = distance / np.maximum(np.maximum(spacing[near], usual), np.finfo(float).tiny)
+    unit = np.maximum(np.maximum(spacing, usual), np.finfo(float).tiny)
+    near = np.flatnonzero(outside(points, tree.mins, tree.maxes) / unit <= halo)  # no farther than from their box
+    away = tree.query(points[near], workers=cores())[0] / unit[near]
     within = away <= halo
     return near[within], away[within]
 

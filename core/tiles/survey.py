@@ -19,7 +19,7 @@ from .shelf import Memory, Part
 from .site import Site
 from .steps import agree, part_of, survey_steps, visit
 
-DEGREE = 8  # of the polynomials for areas: they reach less than a halo of 47 spacings, see docs/tiles.md
+DEGREE = 8  # of the polynomials for areas: they reach less than a halo of 48 spacings, see docs/tiles.md
 
 
 def survey(

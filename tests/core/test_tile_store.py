@@ -102,7 +102,7 @@ class TestStore:
     def test_gives_the_roughness_of_the_whole(self, measured):
         length = float(np.median(whole().smoothing_lengths))
         assert abs(measured.record["wavelength"] / (9.0 * length) - 1.0) < 1e-9
-        same(joined(measured, core.tiles.ROUGHNESS), core.roughness(whole()))
+        same(joined(measured, core.tiles.ROUGHNESS), core.roughness(whole()), 1e-6)
         assert core.tiles.doubted_wavelength(measured.record, core.tiles.HALO) is None
         longer = {**measured.record, "wavelength": np.array(40.0 * length)}
         wavelength, share = core.tiles.doubted_wavelength(longer, core.tiles.HALO)
