@@ -103,9 +103,10 @@ class _Cutting(_TileVerb):
         sources = tile_work.Sources(
             arguments.sources, las_choices(arguments), arguments.columns, arguments.bounds, arguments.level
         )
+        choices = {**measures, "halo": halo, "memory": memory, "workers": 1 if arguments.tile_points else count}
         while True:
             try:
-                store = _cut(sources, folder, most, options, halo, memory, known, measures, progress)
+                store = _cut(sources, folder, most, options, known, choices, progress)
             except tile_work.Incomplete:
                 continue  # without the file that broke off
             return store, _notices(store)
@@ -118,7 +119,7 @@ def _notices(store):
     return [*store.manifest["notices"], *missing]
 
 
-def _cut(sources, folder, most, options, halo, memory, known, measures, progress):
+def _cut(sources, folder, most, options, known, choices, progress):
     begin = 0.0
 
     def chunks():
@@ -129,7 +130,7 @@ def _cut(sources, folder, most, options, halo, memory, known, measures, progress
         known.update({"full color": sources.full, "notices": sources.notices, "broken": broken})
 
     progress("Read", 0.0)
-    return core.tiles.cut_to_store(chunks, folder, most, options, halo=halo, memory=memory, known=known, **measures)
+    return core.tiles.cut_to_store(chunks, folder, most, options, known=known, **choices)
 
 
 class TilesRun(_Cutting):

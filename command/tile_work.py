@@ -13,10 +13,11 @@ from .quantities import eigenvector_name, rows_of, written_by
 STORE = "store"  # the folder within that of a run
 _PIECE = 1_000_000  # points that are read at once
 _SPAWNED = "distributed.nanny.pre-spawn-environ"
-# Memory that is given back is asked for again at once, and cleared first: that took a sixth of a worker's time.
-_KEPT = {"MALLOC_MMAP_THRESHOLD_": 1 << 28, "MALLOC_TRIM_THRESHOLD_": 1 << 29, "MALLOC_ARENA_MAX": 1}
-# What workers hold between tasks is of no use on disk, and looking after them took a twentieth of the time.
-_DASK = {
+# For workers on this machine; docs/tiles.md tells them for clusters of others.
+DASK = {
+    # Memory that is given back is asked for again at once, and cleared first: that took a sixth of a worker's time.
+    _SPAWNED: {"MALLOC_MMAP_THRESHOLD_": 1 << 28, "MALLOC_TRIM_THRESHOLD_": 1 << 29, "MALLOC_ARENA_MAX": 1},
+    # What workers hold between tasks is of no use on disk, and looking after them took a twentieth of the time.
     **{f"distributed.worker.memory.{name}": False for name in ("target", "spill", "pause")},
     "distributed.worker.memory.monitor-interval": "500ms",
     "distributed.worker.profile.enabled": False,
@@ -218,7 +219,7 @@ def workers(count, memory, address):
         ) from error
     with contextlib.ExitStack() as stack:
         if not address:
-            stack.enter_context(dask.config.set({**_DASK, _SPAWNED: dask.config.get(_SPAWNED) | _KEPT}))
+            stack.enter_context(dask.config.set({**DASK, _SPAWNED: dask.config.get(_SPAWNED) | DASK[_SPAWNED]}))
             cluster = LocalCluster(
                 n_workers=count,
                 threads_per_worker=1,

@@ -47,6 +47,7 @@ def cut_to_store(
     viewpoint: ArrayLike | None = None,
     wavelength: float | None = None,
     memory: int | None = None,
+    workers: int = 1,
     known: dict[str, Any] | None = None,
 ) -> Store:
     """Cut a cloud that need not fit the memory into tiles on disk.
@@ -74,6 +75,8 @@ def cut_to_store(
         Of the roughness [L], see `core.roughness`; zero for the usual one. If not given, there is no roughness.
     memory : int, optional
         Bytes that a tile may take: larger ones are left out, with an error.
+    workers : int
+        The number of tiles is a multiple of theirs, so that none waits for others, where tiles stay wide against halos.
     known : dict, optional
         What else the manifest is to tell, such as the sources.
 
@@ -106,7 +109,7 @@ def cut_to_store(
     counted = _count(chunks())
     sides = orientation(orient, place, counted.columns)
     fitting = None if memory is None else memory // needed_memory(1, options)
-    plan = _plan(counted, -(-counted.count // most), halo, fitting)
+    plan = _plan(counted, _tiles(counted.count, most, halo, workers), halo, fitting)
     building = folder.with_name(f".{folder.name}.part")
     try:
         shutil.rmtree(building, ignore_errors=True)  # of a cut that was killed
@@ -228,6 +231,13 @@ def _spread(chunks: Chunks, folder: Path, plan: Plan, counted: _Counted) -> list
             f"The files held {counted.count:,} points at first and {sum(sizes):,} when read again. Cut them again."
         )
     return sizes
+
+
+def _tiles(count: int, most: int, halo: float, workers: int) -> int:
+    """Return how many tiles so many points make, as many for each worker where they stay wide against halos."""
+    least = -(-count // most)
+    shared = -(-least // workers) * workers
+    return shared if count / shared >= (NARROWEST * halo) ** 2 else least
 
 
 def _plan(counted: _Counted, tiles: int, halo: float, fitting: int | None) -> Plan:

@@ -241,6 +241,14 @@ class TestCut:
         assert len(store.alive) == store.count
         assert max(len(store.part(number).points) for number in range(store.count)) <= fitting
 
+    def test_each_worker_has_as_many_tiles(self, tmp_path):
+        counts = []
+        for workers, halo in [(1, 5.0), (2, 5.0), (8, 5.0), (8, 15.0)]:
+            folder = tmp_path / f"{workers} {halo}"
+            store = core.tiles.cut_to_store(lambda: [(rod(), {})], folder, 1200, halo=halo, workers=workers)
+            counts.append(store.count)
+        assert counts == [3, 4, 8, 3]  # at last they would be narrow against their halos
+
     def test_parts_from_what_fills_a_volume_what_is_apart(self, tmp_path):
         rng = np.random.default_rng(0)
         points = np.concatenate([rod(), rng.random((9000, 3)) + [50.0, 0.0, 0.0], np.eye(3) + [90.0, 0.0, 0.0]])

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -10,8 +11,9 @@ import time
 import numpy as np
 import psutil
 import pytest
+import yaml
 
-from .conftest import call, site
+from .conftest import ROOT, call, site
 
 CODE = "import sys; from meshfree_laplacian.command.main import main; sys.exit(main())"
 LENGTH, RADIUS, COUNT = 12.0, 0.125, 4000
@@ -71,3 +73,23 @@ def test_a_killed_worker_changes_nothing(place, folder):
         np.testing.assert_array_equal(second[key], values)
     assert not list(store.rglob(".*"))
     assert not list(store.rglob("state-*"))
+
+
+def test_the_manual_has_the_settings_of_dask(place):
+    code = "import json; from meshfree_laplacian.command.tile_work import DASK; print(json.dumps(DASK))"
+    wanted = json.loads(call(sys.executable, "-c", code, env={"PYTHONPATH": str(site(place))}))
+    page = (ROOT / "docs" / "tiles.md").read_text(encoding="utf-8")
+    [text] = re.findall(r"^```yaml\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    found = yaml.safe_load(text)
+    for name, value in wanted.items():
+        *folders, last = name.split(".")
+        inner = found
+        for folder in folders:
+            inner = inner[folder]
+        assert inner.pop(last) == value
+    assert not list(_leaves(found))
+
+
+def _leaves(table):
+    for value in table.values():
+        yield from _leaves(value) if isinstance(value, dict) else [value]
