@@ -13,10 +13,11 @@ from .quantities import eigenvector_name, rows_of, written_by
 STORE = "store"  # the folder within that of a run
 _PIECE = 1_000_000  # points that are read at once
 _SPAWNED = "distributed.nanny.pre-spawn-environ"
+_NEVER = 1 << 40  # bytes
 # For workers on this machine; docs/tiles.md tells them for clusters of others.
 DASK = {
     # Memory that is given back is asked for again at once, and cleared first: that took a sixth of a worker's time.
-    _SPAWNED: {"MALLOC_MMAP_THRESHOLD_": 1 << 28, "MALLOC_TRIM_THRESHOLD_": 1 << 29, "MALLOC_ARENA_MAX": 1},
+    _SPAWNED: {"MALLOC_MMAP_THRESHOLD_": _NEVER, "MALLOC_TRIM_THRESHOLD_": _NEVER, "MALLOC_ARENA_MAX": 1},
     # What workers hold between tasks is of no use on disk, and looking after them took a twentieth of the time.
     **{f"distributed.worker.memory.{name}": False for name in ("target", "spill", "pause")},
     "distributed.worker.memory.monitor-interval": "500ms",
