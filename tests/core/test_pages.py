@@ -18,7 +18,7 @@ from tests.core.copc_files import write_copc
 from tests.pages import NOT_RUN, ROOT, snippets, typed
 
 MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
-RUN = {"core", "make", "bpy", "blender", "json", "meshfree", "wheel", "yaml"}  # by the other tests of pages, and tests/wheel
+RUN = {"core", "make", "bpy", "blender", "json", "meshfree", "wheel", "yaml"}  # here, in Blender, and by tests/wheel
 
 
 def by_name(kind):
