@@ -40,9 +40,9 @@ def blue_noise_subset(points: ArrayLike, count: int, *, progress: Report | None 
     Returns
     -------
     ndarray, (k,) int
-        Indices, ascending; k lies between nine tenths of the count and the count, or is a little less where the points
-        are many times denser in some places. Of points at one place one at most. All different places where there are
-        no more than the count.
+        Indices, ascending; k lies between nine tenths of the count and the count. Where no radius leaves as many, as
+        where coordinates are rounded, or far denser in some places, others further apart than a smaller radius fill up.
+        Of points at one place one at most. All different places where there are no more than the count.
 
     Raises
     ------
@@ -140,9 +140,14 @@ def _thin(points: Floats, keys: Ints, count: int, report: Report) -> Bools:
         if not below < radius < most:
             radius = 0.5 * (below + most)
     while best is None:  # far denser in some places than in others
+        below = radius
         radius *= 1.5
         kept = _discs(tree, rank, radius)
         best = kept if np.count_nonzero(kept) <= count else None
+    missing = count - np.count_nonzero(best)
+    if below and missing > (1.0 - _FEW) * count:  # no radius leaves as many, as where coordinates are rounded
+        more = np.flatnonzero(_discs(tree, np.where(best, rank - len(rank), rank), below) & ~best)
+        best[more[np.argsort(rank[more])[:missing]]] = True
     return best
 
 

@@ -49,6 +49,17 @@ def test_density_is_evened_out():
     assert np.mean(chosen[:, 0] > 0.0) == pytest.approx(0.5, abs=0.03)
 
 
+@pytest.mark.parametrize("count", [10000, 13000, 15000, 17000])
+def test_rounded_coordinates_leave_as_many(count):
+    """Distances between them jump, so that one radius leaves far too few, and any smaller one too many."""
+    points = np.round(torus_points(60000), 2)
+    chosen = points[core.blue_noise_subset(points, count)]
+    assert 0.9 * count <= len(chosen) <= count
+    spacing = spacing_of(count, np.pi**2 * 1.6)
+    assert cKDTree(chosen).query(chosen, k=2)[0][:, 1].min() > 0.6 * spacing
+    assert cKDTree(chosen).query(points)[0].max() < 1.2 * spacing
+
+
 def test_order_makes_no_difference(sphere, subset):
     order = np.random.default_rng(1).permutation(len(sphere))
     again = core.blue_noise_subset(sphere[order], 3000)
