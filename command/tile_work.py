@@ -19,7 +19,8 @@ DASK = {
     # Memory that is given back is asked for again at once, and cleared first: that took a sixth of a worker's time.
     _SPAWNED: {"MALLOC_MMAP_THRESHOLD_": _NEVER, "MALLOC_TRIM_THRESHOLD_": _NEVER, "MALLOC_ARENA_MAX": 1},
     # What workers hold between tasks is of no use on disk, and looking after them took a twentieth of the time.
-    **{f"distributed.worker.memory.{name}": False for name in ("target", "spill", "pause")},
+    # Nor are workers ended for what they seem to take, in which files count that they look at in place.
+    **{f"distributed.worker.memory.{name}": False for name in ("target", "spill", "pause", "terminate")},
     "distributed.worker.memory.monitor-interval": "500ms",
     "distributed.worker.profile.enabled": False,
     "distributed.admin.tick.interval": "1s",
@@ -206,14 +207,15 @@ def workers(count, memory, address):
     Yields
     ------
     callable
-        Takes a function and tuples of arguments, and yields its results as they come.
+        Takes a function and tuples of arguments, and yields its results as they come. It may raise
+        `NotEnoughMemoryError`.
     """
     if count == 1 and not address:
         yield one_by_one
         return
     try:
         import dask
-        from distributed import Client, LocalCluster, as_completed
+        from distributed import Client, KilledWorker, LocalCluster, as_completed
     except ImportError as error:
         raise core.PointCloudError(
             f"Several workers need Dask, and {error.name} is missing. Install {_PACKAGE}, or use one worker."
@@ -233,7 +235,13 @@ def workers(count, memory, address):
 
         def spread(function, many):
             futures = client.map(function, *zip(*many, strict=True), pure=False) if many else []
-            return (done.result() for done in as_completed(futures))
+            try:
+                yield from (done.result() for done in as_completed(futures))
+            except KilledWorker as error:
+                raise core.NotEnoughMemoryError(
+                    "Workers ended one after the other at the same tile, as where the memory is not enough. Go on with"
+                    " fewer workers, or cut into another folder with --tile-points for smaller tiles."
+                ) from error
 
         yield spread
 

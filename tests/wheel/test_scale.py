@@ -75,6 +75,19 @@ def test_a_killed_worker_changes_nothing(place, folder):
     assert not list(store.rglob("state-*"))
 
 
+def test_workers_that_end_one_after_the_other_are_told(place):
+    code = """
+import os
+from meshfree_laplacian.command import tile_work
+with tile_work.workers(2, 1 << 30, "") as spread:
+    try:
+        list(spread(os._exit, [(1,)]))
+    except tile_work.core.NotEnoughMemoryError as error:
+        print(error)
+"""
+    assert "--tile-points" in call(sys.executable, "-c", code, env={"PYTHONPATH": str(site(place))})
+
+
 def test_the_manual_has_the_settings_of_dask(place):
     code = "import json; from meshfree_laplacian.command.tile_work import DASK; print(json.dumps(DASK))"
     wanted = json.loads(call(sys.executable, "-c", code, env={"PYTHONPATH": str(site(place))}))
