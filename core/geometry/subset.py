@@ -140,10 +140,12 @@ def _thin(points: Floats, keys: Ints, count: int, report: Report) -> Bools:
         if not below < radius < most:
             radius = 0.5 * (below + most)
     while best is None:  # far denser in some places than in others
-        below = radius
         radius *= 1.5
         kept = _discs(tree, rank, radius)
-        best = kept if np.count_nonzero(kept) <= count else None
+        if np.count_nonzero(kept) <= count:
+            best = kept
+        else:
+            below = radius
     missing = count - np.count_nonzero(best)
     if below and missing > (1.0 - _FEW) * count:  # no radius leaves as many, as where coordinates are rounded
         more = np.flatnonzero(_discs(tree, np.where(best, rank - len(rank), rank), below) & ~best)
