@@ -159,7 +159,7 @@ class TilesRun(_Cutting):
             store, notices = self.cut(arguments, arguments.workers, _share(stages, 0.0, _READ))
             if arguments.modes:
                 core.tiles.ask_for_modes(store, arguments.modes, arguments.mode_points)
-            with tile_work.workers(arguments.workers, store.manifest["memory"], arguments.scheduler) as spread:
+            with tile_work.workers(arguments.workers, arguments.scheduler) as spread:
 
                 def visit_all(step, numbers):
                     return spread(core.tiles.visit_tile, [(str(store.folder), step, number) for number in numbers])

@@ -21,7 +21,6 @@ DASK = {
     # What workers hold between tasks is of no use on disk, and looking after them took a twentieth of the time.
     # Nor are workers ended for what they seem to take, in which files count that they look at in place.
     **{f"distributed.worker.memory.{name}": False for name in ("target", "spill", "pause", "terminate")},
-    "distributed.worker.memory.monitor-interval": "500ms",
     "distributed.worker.profile.enabled": False,
     "distributed.admin.tick.interval": "1s",
     "distributed.admin.system-monitor.interval": "5s",
@@ -192,15 +191,13 @@ def one_by_one(function, many):
 
 
 @contextlib.contextmanager
-def workers(count, memory, address):
+def workers(count, address):
     """Provide a function that calls another with a folder, and each of some arguments, on all workers.
 
     Parameters
     ----------
     count : int
         Processes on this machine; with one, and no address, all is done in this one.
-    memory : int
-        Bytes that each may take.
     address : str
         Of the scheduler of a Dask cluster, or empty.
 
@@ -226,7 +223,6 @@ def workers(count, memory, address):
             cluster = LocalCluster(
                 n_workers=count,
                 threads_per_worker=1,
-                memory_limit=memory,
                 dashboard_address=None,
                 env={"MESHFREE_CORES": str(core.tiles.cores_of_worker(count))},
             )

@@ -93,7 +93,7 @@ class TestRun:
 
     def test_several_workers_need_dask(self, scans, done, monkeypatch):
         monkeypatch.setitem(__import__("sys").modules, "distributed", None)
-        with pytest.raises(core.PointCloudError, match="Dask"), tile_work.workers(2, 1 << 30, ""):
+        with pytest.raises(core.PointCloudError, match="Dask"), tile_work.workers(2, ""):
             pass
 
     @pytest.mark.parametrize(
