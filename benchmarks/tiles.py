@@ -1,9 +1,9 @@
-"""Tiles against the whole cloud: ``python -m benchmarks.tiles torus [points [tiles [halo [degree]]]]``, and ``zoo`` for
+"""Tiles against the whole cloud: ``python -m benchmarks.tiles torus [points [tiles [halo]]]``, and ``zoo`` for
 the shapes in the folder MESHFREE_ZOO; both on random points and with noise, and by another cut besides.
 
 Differences are the largest in the whole cloud, relative to the largest value, of areas and lengths to their own.
 
-``python -m benchmarks.tiles store [points [tile_points [halo [degree [folder]]]]]`` walks over tiles on disk in this
+``python -m benchmarks.tiles store [points [tile_points [halo [folder]]]]`` walks over tiles on disk in this
 process, and prints CPU seconds a point beside those of a cloud of 200,000, the most memory, and the bytes on disk; a
 folder that exists is gone on with. ``run [points [workers [memory [tile_points [folder]]]]]`` does the same by `tiles
 run` with several workers, and tells the most memory of each.
@@ -36,10 +36,10 @@ SOLVED = ("areas", "mean_curvature", "stiffness")
 LABELS = ("boundary", "component", "sides")
 
 
-def in_tiles(points, count, halo, degree):
+def in_tiles(points, count, halo):
     """Measure a cloud in tiles; return its quantities in the order of the points, and the record."""
     tiles = core.tiles.cut(points, count, halo)
-    agreed = core.tiles.survey(points, tiles, degree=degree)
+    agreed = core.tiles.survey(points, tiles)
     parts = [core.tiles.measure_tile(points, tile, agreed) for tile in tiles]
     order = np.argsort(np.concatenate([part.rows for part in parts]))
     found = {
@@ -74,16 +74,16 @@ def differences(found, wanted):
     return result
 
 
-def compare(name, points, count, halo, degree):
+def compare(name, points, count, halo):
     """Print the largest differences between tiles, the whole by the same record, and another cut."""
     began = time.process_time()
-    found, agreed, share = in_tiles(points, count, halo, degree)
+    found, agreed, share = in_tiles(points, count, halo)
     ended = time.process_time()
     wanted = as_a_whole(points, agreed)
     whole = time.process_time() - ended
-    own = core.build_laplacian(points, agreed=core.geometry.Agreed(degree=degree)).agreed
+    own = core.build_laplacian(points).agreed
     flipped = np.count_nonzero((agreed.side * own.side).sum(axis=1) < 0.0)
-    other, _, _ = in_tiles(points, count + 1, halo, degree)
+    other, _, _ = in_tiles(points, count + 1, halo)
     print(
         f"{name}: {len(points):,} points in {count} tiles, {share:.2f} times as many with halos; sides other than of"
         f" the whole's own record: {flipped}; CPU seconds {ended - began:.0f}, as a whole {whole:.0f}"
@@ -93,24 +93,24 @@ def compare(name, points, count, halo, degree):
         print(f"  {title}:", ", ".join(f"{quantity} {value:.0e}" for quantity, value in values.items()), flush=True)
 
 
-def torus(count=400_000, tiles=8, halo=core.tiles.HALO, degree=core.tiles.DEGREE):
+def torus(count=400_000, tiles=8, halo=core.tiles.HALO):
     """Compare on a torus, without noise and with it."""
     points = torus_points(int(count))
-    compare("torus", points, int(tiles), float(halo), int(degree))
+    compare("torus", points, int(tiles), float(halo))
     spacing = np.sqrt(core.estimate_areas(points[:: max(1, len(points) // 2000)]).sum() / len(points))
     noise = NOISE * spacing * np.random.default_rng(1).normal(size=points.shape)
-    compare("torus, noisy", points + noise, int(tiles), float(halo), int(degree))
+    compare("torus, noisy", points + noise, int(tiles), float(halo))
 
 
-def zoo(count=100_000, tiles=4, halo=core.tiles.HALO, degree=core.tiles.DEGREE):
+def zoo(count=100_000, tiles=4, halo=core.tiles.HALO):
     """Compare on real shapes, without noise and with it."""
     for name, (vertices, faces, _) in shapes().items():
-        compare(name, random_points(vertices, faces, int(count))[0], int(tiles), float(halo), int(degree))
+        compare(name, random_points(vertices, faces, int(count))[0], int(tiles), float(halo))
         noisy = noisy_points(vertices, faces, int(count), NOISE)
-        compare(f"{name}, noisy", noisy, int(tiles), float(halo), int(degree))
+        compare(f"{name}, noisy", noisy, int(tiles), float(halo))
 
 
-def store(count=1_000_000, most=250_000, halo=core.tiles.HALO, degree=core.tiles.DEGREE, folder=""):
+def store(count=1_000_000, most=250_000, halo=core.tiles.HALO, folder=""):
     """Measure what tiles on disk cost."""
     count, most, alone = int(count), int(most), whole_seconds()
     with tempfile.TemporaryDirectory() as temporary:
@@ -119,9 +119,7 @@ def store(count=1_000_000, most=250_000, halo=core.tiles.HALO, degree=core.tiles
         if not place.exists():
             parts = np.array_split(torus_points(count), -(-count // 1_000_000))
             began = time.process_time()
-            core.tiles.cut_to_store(
-                lambda: ((part, {}) for part in parts), place, most, halo=float(halo), degree=int(degree)
-            )
+            core.tiles.cut_to_store(lambda: ((part, {}) for part in parts), place, most, halo=float(halo))
             del parts
         cut = time.process_time() - began
         tiles = core.tiles.Store(place)

@@ -15,4 +15,3 @@ FilePath: TypeAlias = str | os.PathLike[str]
 Progress: TypeAlias = Callable[[str, float], None]  # stage and fraction of it
 Report: TypeAlias = Callable[[], None]  # called between steps; may raise Cancelled
 Response: TypeAlias = Callable[[Floats], ArrayLike]  # to eigenvalues
-Shares: TypeAlias = tuple[float, ...]  # of earlier steps, in an extrapolation

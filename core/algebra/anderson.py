@@ -1,10 +1,8 @@
 """Anderson's acceleration of repeated maps."""
 
-from collections.abc import Callable
-
 import numpy as np
 
-from ..types import Floats, Shares
+from ..types import Floats
 
 _MEMORY = 5  # earlier steps that one is extrapolated from
 
@@ -28,31 +26,20 @@ class Anderson:
         self._last: tuple[Floats, Floats] | None = None
         self._differences: list[tuple[Floats, Floats]] = []
 
-    def extrapolate(
-        self, before: Floats, after: Floats, settle: Callable[[Callable[[], Shares]], Shares] = lambda decide: decide()
-    ) -> Floats:
-        """Return the start of the next step.
-
-        Parameters
-        ----------
-        before, after : ndarray
-            Start and end of the last step, of one shape.
-        settle : callable
-            Takes a function that decides by how much each of the earlier steps counts, and returns its decision, or
-            that of another run: then parts of one problem can be worked on one by one.
-        """
+    def extrapolate(self, before: Floats, after: Floats) -> Floats:
+        """Return the start of the next step, from start and end of the last one, of one shape."""
         change = after - before
         if self._last is not None:
             difference = after - self._last[0], change - self._last[1]
             self._differences = [*self._differences[1 - _MEMORY :], difference]
         self._last = after, change
-        shares = settle(lambda: self._shares(change))
+        shares = self._shares(change)
         if not shares:
             return after
         steps = [part * ended for part, (ended, _) in zip(shares, self._differences, strict=True)]
         return after - np.sum(steps, axis=0)
 
-    def _shares(self, change: Floats) -> Shares:
+    def _shares(self, change: Floats) -> tuple[float, ...]:
         """Return the shares that make the next change least; none at first, or if no step changed anything."""
         changes = [changed for _, changed in self._differences]
         products = np.array([[_dot(left, right) for left in changes] for right in changes])

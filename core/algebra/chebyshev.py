@@ -1,4 +1,4 @@
-"""Polynomials of a matrix, by its products."""
+"""Chebyshev polynomials of a matrix, by its products."""
 
 from collections.abc import Callable, Iterator
 
@@ -59,3 +59,31 @@ def chebyshev_terms(product: Callable[[Floats], Floats], start: Floats) -> Itera
         following *= 2.0
         following -= before
         before, now = now, following
+
+
+def chebyshev_steps(least: float, largest: float) -> Iterator[tuple[float, float]]:
+    """Yield how to go on, without end, from round to round of solving equations by their residuals alone.
+
+    Parameters
+    ----------
+    least, largest : float
+        Bounds of the eigenvalues, 0 < least < largest. What belongs to lower ones is solved for more slowly.
+
+    Yields
+    ------
+    kept, rate : float
+        The next step is the last one times `kept`, and the residual times `rate`. After k steps the residual is that
+        polynomial of degree k of the first one which is least over all eigenvalues, ``T_k((b + a - 2 x) / (b - a))``
+        over its value at x = 0, for bounds a and b.
+
+    References
+    ----------
+    Golub, Varga. Chebyshev semi-iterative methods. Numer. Math. 3, 1961.
+    """
+    middle, half = 0.5 * (largest + least), 0.5 * (largest - least)
+    ratio = half / middle
+    yield 0.0, 1.0 / middle
+    while True:
+        following = 1.0 / (2.0 * middle / half - ratio)
+        yield following * ratio, 2.0 * following / half
+        ratio = following

@@ -50,12 +50,8 @@ class Agreed:
         Points next to each other over which sheets hang together that nothing else joins.
     length : float, optional
         The one smoothing length, scaled, of a "global" bandwidth.
-    degree : int, optional
-        Of the polynomials that solve for areas: a low one reaches less far.
     ratio : ndarray, (components,), optional
         By which the areas of each component are scaled at last.
-    shares : tuple of tuple of float, optional
-        For each round of balancing the weights, what it is extrapolated by from the earlier ones.
 
     See Also
     --------
@@ -88,9 +84,7 @@ class Agreed:
     side: Floats | None = None
     bridges: Ints | None = None
     length: float | None = None
-    degree: int | None = None
     ratio: Floats | None = None
-    shares: tuple[tuple[float, ...], ...] | None = None
 
     def among(self, rows: Ints, count: int) -> Self:
         """Return the same for some of the points, by their rows, (k,) int, each once, of so many points in all."""
@@ -129,12 +123,6 @@ class Decisions:
         value: _Value = decide() if given is None else given[min(step, len(given) - 1)]
         self._note(name, (*(getattr(self.made, name) or ())[:step], value))
         return value
-
-    def rounds(self, name: str) -> int | None:
-        """Return how many rounds are agreed on under a name; None where that is open."""
-        given = getattr(self._given, name)
-        self._note(name, () if given is None else given)
-        return None if given is None else len(given)
 
     def label(self, name: str, scaled: ScaledPoints, decide: Callable[[], Ints]) -> Ints:
         """Return the labels of distinct points, (m,) from 0 without gaps, those left out -1."""

@@ -8,7 +8,7 @@ from scipy import sparse
 
 from ..types import Array, Floats, Ints
 
-_PAIRS = 1 << 16  # of a patch, about: of fewer, and Python's share of the work grows
+_PAIRS = 1 << 15  # of a patch, about: of more, and the system clears memory anew each time; of fewer, Python's share grows
 
 
 @dataclass(frozen=True)

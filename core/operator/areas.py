@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..geometry import Boundary, Cloud, Pairs, Patch
 
 _FLOOR = 0.5  # least area in units of that of the Voronoi cell: all stay positive
-_DEGREE = 100  # of the polynomial of the first round; half of it of the second, for what the floor changed in the first
+_DEGREE = 8  # of the polynomial of the first round; half of it of the second, for what the floor changed in the first
 _EVEN = 1e-9  # changes of h, as a share, that are rounding
 _MANY = 1 << 20  # pairs from which a product takes longer than to start threads
 NO_AREA = 1e-300  # of points left out: positive, and negligible in any sum
@@ -96,8 +96,7 @@ def solve_areas(cloud: Cloud, distance: Floats, report: Report = lambda: None) -
     lengths = cloud.pairs.lengths
     matrix = KernelMatrix(cloud.pairs, distance, cloud.boundary, report)
     target = kernel_integral(lengths, cloud.gaussian_curvature) + _gain(matrix, lengths)
-    degree = cloud.decisions.settle("degree", lambda: _DEGREE)
-    return _like_cells(matrix, fast_areas(matrix, target, cloud.cell_areas, degree), cloud)
+    return _like_cells(matrix, fast_areas(matrix, target, cloud.cell_areas), cloud)
 
 
 def _like_cells(matrix: KernelMatrix, areas: Floats, cloud: Cloud) -> Floats:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..algebra import Anderson, inverses, on_all_cores
+from ..algebra import chebyshev_steps, inverses, on_all_cores
 from ..geometry import LARGEST, MET, TERMS, EdgeTerms, dots, frames, put_terms
 from ..kernel import SECOND_MOMENT
 from ..types import Floats, Ints, Report
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     from ..geometry import Cloud, Patch
 
 _ROUNDS = 16  # of the solver, at most
-_SMALLEST = 1e-8  # regularization of the extrapolation, see `Anderson`
+_SPECTRUM = 0.05, 2.2  # of the equations over those of single points: below 2, but for changes of these from the first
 
 
 @dataclass(frozen=True)
@@ -54,9 +53,12 @@ def balance_weights(
     Next to a boundary images complete the sums, and functions do not change across it: the quadratic ones are the
     square of the distance to it, and those along it. A pair and its image take one factor.
 
-    It is solved by Newton's method point by point, the other ends of the pairs fixed, in steps of one at most, and
-    Anderson's extrapolation from the last rounds. Where a few points lie in a row, or on one side, no weights have
-    these moments, and the residual is large.
+    It is solved by Newton's method point by point, the other ends of the pairs fixed, in steps of one at most, with
+    Chebyshev's acceleration: the equations of all points, over those of each alone, have their eigenvalues in [0, 2],
+    as each pair adds the square of a sum of its ends to the entropy, and that of a difference would be positive too. So
+    what is done at a point depends on the points around it alone, not on those of the whole cloud. A point whose
+    moments are met is left alone, and all ends where all are. Where a few points lie in a row, or on one side, no
+    weights have these moments, and the residual is large.
 
     Parameters
     ----------
@@ -79,21 +81,20 @@ def balance_weights(
     moments = _Moments(cloud, distance, weights, 4.0 * areas * _trace(cloud, weights, areas) / lengths**2, report)
     goal = np.zeros((len(areas), TERMS))
     goal[:, 0] = 1.0
-    terms, decisions = np.zeros_like(goal), cloud.decisions
-    last = decisions.rounds("shares")
-    for step in range(_ROUNDS + 1):
+    terms, step, rates = np.zeros_like(goal), np.zeros_like(goal), chebyshev_steps(*_SPECTRUM)
+    for number in range(_ROUNDS + 1):
         missing = goal - moments.of(terms)
         residual = np.linalg.norm(missing, axis=1)
-        off = np.sqrt(np.mean((residual / lengths) ** 2))  # what a first moment makes of a slope
-        if step == _ROUNDS or (off < MET if last is None else step == last):
+        met = residual < MET * lengths  # what a first moment makes of a slope
+        if number == _ROUNDS or met.all():
             break
-        if step <= _ROUNDS // 2 and (step + 2).bit_count() == 1:  # the Hessian, each time for twice as many rounds
-            inverse = inverses(moments.curvature(terms) + MET * np.eye(TERMS))
-            acceleration = Anderson(_SMALLEST)
-        change = np.einsum("iab,ib->ia", inverse, missing - MET * terms)
-        change /= np.maximum(np.linalg.norm(change, axis=1, keepdims=True), 1.0)
-        settle = functools.partial(decisions.settle_round, "shares", step)
-        terms = acceleration.extrapolate(terms, terms + change, settle)
+        if number < 2:  # from the kernel's weights to nearly the end in the first round, half a step
+            inverse = inverses(0.5 * moments.curvature(terms) + MET * np.eye(TERMS))
+        kept, rate = next(rates) if number else (0.0, 0.5)
+        step = kept * step + rate * np.einsum("iab,ib->ia", inverse, missing - MET * terms)
+        step /= np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1.0)
+        step[met] = 0.0
+        terms += step
     return Balance(moments.factor(terms), residual)
 
 

@@ -8,5 +8,5 @@ from .roughness import ROUGHNESS, doubted_wavelength
 from .run import pending, run_steps, settle, steps_of, visit_tile
 from .seen import ORIENTS
 from .store import Store, tile_folder
-from .survey import DEGREE, survey
+from .survey import survey
 from .workers import cores_of_worker, memory_of_worker

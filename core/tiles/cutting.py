@@ -25,7 +25,6 @@ from .shelf import Record, Told
 from .site import Site
 from .steps import Step
 from .store import COLUMNS, POINTS, Store, tile_folder, write_manifest
-from .survey import DEGREE
 
 Chunks: TypeAlias = Iterable[tuple[Floats, dict[str, Array]]]  # coordinates, and what is told of the points besides
 
@@ -42,7 +41,6 @@ def cut_to_store(
     options: LaplacianOptions = LaplacianOptions(),
     *,
     halo: float = HALO,
-    degree: int = DEGREE,
     orient: str = "outside",
     viewpoint: ArrayLike | None = None,
     wavelength: float | None = None,
@@ -65,8 +63,6 @@ def cut_to_store(
         Settings.
     halo : float
         See `cut`.
-    degree : int
-        See `survey`.
     orient : {"outside", "up", "viewpoint"}
         See `survey`.
     viewpoint : array_like, (3,), optional
@@ -115,7 +111,7 @@ def cut_to_store(
         shutil.rmtree(building, ignore_errors=True)  # of a cut that was killed
         building.mkdir(parents=True)
         sizes = _spread(chunks(), building, plan, counted)
-        agreed = {"center": counted.center, "scale": counted.scale, "degree": degree, **sides, **asked}
+        agreed = {"center": counted.center, "scale": counted.scale, **sides, **asked}
         left_out = {"columns left out": counted.left_out, "halo": halo, "memory": memory}
         write_manifest(building, options, sizes, agreed, {**(known or {}), **left_out, "points": counted.count})
         os.replace(building, folder)

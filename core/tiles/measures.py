@@ -1,4 +1,4 @@
-"""The last steps of the walk in tiles: sides, areas, the shares of weights, and all results."""
+"""The last steps of the walk in tiles: sides, areas, and all results."""
 
 from __future__ import annotations
 
@@ -18,19 +18,17 @@ from ..geometry import (
     side_sums,
     signs_by_sums,
 )
-from ..operator import LaplaceBeltrami, assemble_laplacian, build_laplacian, mean_curvature, solve_areas
+from ..operator import LaplaceBeltrami, assemble_laplacian, mean_curvature, solve_areas
 from ..options import LaplacianOptions
 from ..types import Array, Floats, Ints
 from .labels import agree_on_signs, starts
 from .neighborhoods import Fitted, divided
-from .places import points_around
 from .roughness import agree_on_wavelength, tell_lengths, tell_roughness
 from .seen import signs_by_seen, tell_seen
 from .shelf import Record, Shelf, Told, visited
 from .site import Site
 
 _LINK = 1e-3  # weight of links between patches of one tile, against points that two tiles have in common
-_TRIAL = 8000  # points on which the weights are balanced, for the shares
 
 
 class Solved(NamedTuple):
@@ -133,20 +131,6 @@ def agree_on_areas(shelf: Shelf, options: LaplacianOptions) -> Record:
     """Agree on by how much the areas of each component are scaled, and on the wavelength of the roughness."""
     total, found = _added(shelf, "areas", "sums").T
     return {"ratio": total / np.where(found > 0.0, found, 1.0), **agree_on_wavelength(shelf, "areas")}
-
-
-def share_weights(site: Site, state: object) -> tuple[None, Told]:
-    """Balance the weights of the points around the center, for what each round takes from the earlier ones."""
-    part = points_around(site.shelf, site.record["center"], _TRIAL)
-    trial = build_laplacian(part.points, options=site.options, agreed=Site(site.shelf, -1, site.options, part).agreed())
-    shares = trial.agreed.shares or ()
-    flat = np.array([share for step in shares for share in step], dtype=float)
-    return None, {"shares": flat, "rounds": np.array([len(step) for step in shares], dtype=np.int64)}
-
-
-def agree_on_shares(shelf: Shelf, options: LaplacianOptions) -> Record:
-    """Agree on these."""
-    return {name: next(shelf.told("shares", name)) for name in ("shares", "rounds")}
 
 
 def measure(site: Site, solved: Solved) -> tuple[None, Told]:

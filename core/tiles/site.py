@@ -96,10 +96,7 @@ class Site:
             known["side"] = self.sides()
         if "bridges" in record:
             known["bridges"] = self._bridges(record["bridges"])
-        if "shares" in record:
-            ends = np.cumsum(record["rounds"])[:-1]
-            known["shares"] = tuple(tuple(part.tolist()) for part in np.split(record["shares"], ends))
-        return Agreed(degree=int(record["degree"]), **known)
+        return Agreed(**known)
 
     def decisions(self) -> Decisions:
         """Return the same for a sample of the points here."""

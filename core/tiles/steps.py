@@ -92,7 +92,6 @@ _SURVEY = (
     Step("bridges", "Sheets", 0.5, neighborhoods.find_bridges, neighborhoods.agree_on_bridges, needed=_of_sheets),
     Step("length", "Areas", 1.0, neighborhoods.find_length, neighborhoods.agree_on_length, needed=_of_one_length),
     Step("areas", "Areas", 30.5, measures.find_areas, measures.agree_on_areas),
-    Step("shares", "Operator", 1.2, measures.share_weights, measures.agree_on_shares, at_first),
 )
 MEASURE = Step("measure", "Operator", 31.0, measures.measure)
 

@@ -20,7 +20,7 @@ from ..options import LaplacianOptions
 from ..types import Array, Floats
 from .shelf import Part, Record, Told, visited
 
-VERSION = 2
+VERSION = 3
 POINTS, COLUMNS = "points.npy", "columns.npy"
 _MANIFEST, _ERROR = "manifest.json", "error.json"
 _TRUSTED = ("numpy", "scipy", "builtins", "copyreg", __package__.rpartition(".")[0])  # packages of what states hold

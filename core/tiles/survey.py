@@ -19,15 +19,12 @@ from .shelf import Memory, Part
 from .site import Site
 from .steps import agree, part_of, survey_steps, visit
 
-DEGREE = 8  # of the polynomials for areas: they reach less than a halo of 48 spacings, see docs/tiles.md
-
 
 def survey(
     points: ArrayLike,
     tiles: Sequence[Tile],
     options: LaplacianOptions = LaplacianOptions(),
     *,
-    degree: int = DEGREE,
     orient: str = "outside",
     viewpoint: ArrayLike | None = None,
     progress: Progress | None = None,
@@ -42,9 +39,6 @@ def survey(
         From `cut`.
     options : LaplacianOptions
         Settings.
-    degree : int
-        Of the polynomials that solve for areas. A higher one asks for more of a halo: 24 for 60 spacings. An operator
-        of all points at once has 100.
     orient : {"outside", "up", "viewpoint"}
         The side that normals are on: away from the middle of each component, or up where that is a sheet, as of
         `estimate_normals`; the side that is seen from above; or that which is seen from a place.
@@ -86,7 +80,7 @@ def survey(
     if seen_from is not None and seen_from.ndim == 2:
         columns, seen_from = {SCANNER: seen_from}, None
     sides = orientation(orient, seen_from, columns)
-    record = {"center": center, "scale": scale, "degree": np.array(degree), **sides}
+    record = {"center": center, "scale": scale, **sides}
     shelf = Memory(points, tiles, record, "areas", columns)
     report = progress or (lambda stage, fraction: None)
     steps = survey_steps(options)

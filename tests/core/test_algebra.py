@@ -1,10 +1,12 @@
-"""Polynomials of matrices, their largest eigenvalue, accelerated maps and small systems, against what is known."""
+"""Polynomials of matrices, their largest eigenvalue, equations by residuals, small systems, against what is known."""
+
+import itertools
 
 import numpy as np
 import pytest
 from scipy.sparse.linalg import ArpackNoConvergence
 
-from core.algebra import Anderson, chebyshev_terms, eigenvalue, eliminate, largest_eigenvalue
+from core.algebra import Anderson, chebyshev_steps, chebyshev_terms, eigenvalue, eliminate, largest_eigenvalue
 from core.errors import SolverError
 
 
@@ -66,6 +68,18 @@ def test_anderson_takes_the_first_step_as_it_is_and_stays_where_nothing_changes(
     np.testing.assert_array_equal(acceleration.extrapolate(np.zeros((3, 2)), after), after)
     for _ in range(8):
         np.testing.assert_array_equal(acceleration.extrapolate(after - 1.0, after), after)
+
+
+def test_chebyshev_steps_solve_equations_as_fast_as_any_polynomial_of_their_residuals_can():
+    least, largest = 0.1, 2.0
+    eigenvalues, right = np.linspace(least, largest, 200), np.ones(200)
+    place, step = np.zeros(200), 0.0
+    for number, (kept, rate) in enumerate(itertools.islice(chebyshev_steps(least, largest), 12)):
+        residual = right - eigenvalues * place
+        bound = 1.0 / np.cosh(number * np.arccosh((largest + least) / (largest - least)))
+        np.testing.assert_allclose(np.abs(residual).max(), bound, rtol=1e-9)
+        step = kept * step + rate * residual
+        place = place + step
 
 
 @pytest.mark.parametrize("size", [1, 2, 5])

@@ -62,7 +62,7 @@ def measured(walk):
 
 @cache
 def whole():
-    return core.build_laplacian(rod(), agreed=core.geometry.Agreed(degree=core.tiles.DEGREE))
+    return core.build_laplacian(rod())
 
 
 def same(found, wanted, rtol=1e-5):

@@ -60,7 +60,7 @@ class TestRun:
         assert sum(len(table.points) for table in tables) == COUNT
         area = sum(table.attributes["lb_area"].astype(float).sum() for table in tables)
         points = np.concatenate([read_points(scans / f"{name}.ply").points for name in "ab"])
-        whole = core.build_laplacian(points, agreed=core.geometry.Agreed(degree=core.tiles.DEGREE))
+        whole = core.build_laplacian(points)
         assert abs(area / whole.areas.sum() - 1.0) < 1e-6
         for table in tables:
             half = table.points[:, 0] >= 0.5 * LENGTH
@@ -196,7 +196,7 @@ def test_stages_give_the_same_to_the_bit(run, scans, done, tmp_path):
             assert (code, line["visited"] <= 1) == (0, True)
         steps.append(line["step"])
     assert steps[0] == "extent"
-    assert steps[-1] == "shares"
+    assert steps[-1] == "areas"
     assert run("tiles", "measure", out, "--tiles", "1/2", "--format", "npy")[1][0]["waiting"] == 1
     assert "wait for the step measure" in run("tiles", "agree", out)[1][0]["error"]
     run("tiles", "measure", out, "--tiles", "2/2", "--format", "npy")
