@@ -118,11 +118,13 @@ from .geometry import orient_normals as orient_normals
 from .geometry import surface_discs as surface_discs
 from .memory import points_that_fit as points_that_fit
 from .operator import LaplaceBeltrami as LaplaceBeltrami
+from .operator import MeanCurvature as MeanCurvature
 from .operator import PrincipalCurvatures as PrincipalCurvatures
 from .operator import Spectrum as Spectrum
 from .operator import build_laplacian as build_laplacian
 from .operator import estimate_areas as estimate_areas
 from .operator import mean_curvature as mean_curvature
+from .operator import measure_mean_curvature as measure_mean_curvature
 from .operator import principal_curvatures as principal_curvatures
 from .options import LaplacianOptions as LaplacianOptions
 from .options import PaperOptions as PaperOptions

@@ -109,6 +109,8 @@ class Cloud:
         Second fundamental form of local quadrics, positive where the surface curves away from the normal.
     gaussian_curvature : ndarray, (m,)
         Of local quadrics.
+    curvature_scatter : ndarray, (m,)
+        Of their mean curvature, over that of noise across the surface.
     cell_areas : ndarray, (m,)
         Areas of the points' Voronoi cells.
     cell_radius : ndarray, (m,)
@@ -137,6 +139,7 @@ class Cloud:
     moved: Floats
     shape_operator: Floats
     gaussian_curvature: Floats
+    curvature_scatter: Floats
     cell_areas: Floats
     cell_radius: Floats
     spacing: Floats
@@ -262,6 +265,7 @@ def measure_surface(
         moved=sample.moved,
         shape_operator=side[:, None, None] * quadrics.shape_operator,
         gaussian_curvature=gaussian,
+        curvature_scatter=quadrics.scatter,
         cell_areas=cells.areas,
         cell_radius=cells.radius,
         spacing=nearest.spacing,

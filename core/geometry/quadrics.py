@@ -12,6 +12,7 @@ _BLOCK = 1 << 13  # points fitted at one time
 _CURVE = 5e-3  # roundness of neighbours on a curve
 MANY = 0.1  # share of the points: fewer are a few places, and not the whole scan
 CURVED = 0.3  # share by which curvature may change a length, an area or a weight at most, where the fit is poor
+_FADING = 0.84  # scatter of fits with weights that fade, over that with the same number of equal ones
 _RIDGE = 1e-10  # keeps the normal equations solvable where the neighbours lie on a conic
 
 
@@ -32,6 +33,9 @@ class Quadrics:
         surface curves away from the normal.
     misfit : ndarray, (m,)
         Root mean square distance of the neighbours from the quadric [L].
+    scatter : ndarray, (m,)
+        Standard deviation of the mean curvature over that of noise across the surface [1 / L^2], by the places of the
+        neighbours, within a tenth where these lie around the point.
     roundness : ndarray, (m,)
         Variance of the neighbours across over that along: next to zero on a curve, which has no normal; one where the
         normal was given.
@@ -42,6 +46,7 @@ class Quadrics:
     height: Floats
     shape_operator: Floats
     misfit: Floats
+    scatter: Floats
     roundness: Floats
 
     def take(self, rows: Ints) -> "Quadrics":
@@ -87,6 +92,7 @@ def fit_quadrics(
         height=np.empty((count, 3)),
         shape_operator=np.empty((count, 3, 3)),
         misfit=np.empty(count),
+        scatter=np.empty(count),
         roundness=np.ones(count),
     )
 
@@ -112,7 +118,8 @@ def fit_quadrics(
             for column in range(row + 1):
                 equations[row, column] = equations[column, row] = _sums(weighted, basis[column])
         equations[range(6), range(6)] += _RIDGE
-        fit = eliminate(equations)[:, 6].T
+        solved = eliminate(equations)
+        fit = solved[:, 6].T
         missed = z - sum(values * part[:, None] for values, part in zip(basis, fit.T, strict=True))
         slope = 1.0 + fit[:, 1] ** 2 + fit[:, 2] ** 2
         local = np.stack([np.ones_like(slope), -fit[:, 2], -fit[:, 1]], axis=1) / np.sqrt(slope)[:, None]
@@ -125,6 +132,8 @@ def fit_quadrics(
         fitted.shape_operator[block] = (tangents @ form @ np.swapaxes(tangents, 1, 2)) / unit[:, None, None]
         fitted.height[block] = (fit[:, 0] * unit)[:, None] * frame[:, :, 0]
         fitted.misfit[block] = np.sqrt(_sums(share * missed, missed)) * unit
+        bent = solved[3, 3] + 2.0 * solved[3, 5] + solved[5, 5]  # of the inverse: variance for noise of equal weight
+        fitted.scatter[block] = _FADING * np.sqrt(bent * _sums(share, share)) / unit**2
 
     on_all_cores(fit_block, blocks(count, _BLOCK))
     return fitted

@@ -2,7 +2,13 @@
 
 from .areas import KernelMatrix, estimate_areas, solve_areas
 from .connection import connection_laplacian, tangent_frames
-from .curvature import PrincipalCurvatures, mean_curvature, principal_curvatures
+from .curvature import (
+    MeanCurvature,
+    PrincipalCurvatures,
+    mean_curvature,
+    measure_mean_curvature,
+    principal_curvatures,
+)
 from .implicit import Heights, ImplicitSurface
 from .laplacian import LaplaceBeltrami, assemble_laplacian, build_laplacian, laplacian_of, narrow_laplacian
 from .spectrum import Spectrum, symmetric_form

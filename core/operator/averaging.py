@@ -1,0 +1,169 @@
+"""Averages over neighbours of what noise scatters: as many as take away more of the scatter than they add in bias."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import sparse
+
+from ..types import Array, Floats
+
+if TYPE_CHECKING:
+    from .laplacian import LaplaceBeltrami
+
+ROUNDS = (0, 1, 2, 4, 8)  # of averaging that are compared; the last reaches as far as halos of tiles allow
+_WINDOWS = 3, 3, 5, 8  # rounds over which a change by averaging is measured: those around say the same, but not chance
+_CHANCE = 1.5  # times what noise alone would change: more is bias
+_NOISE_ROUNDS = 3  # over which noise is measured
+_LOG = 2.0 * np.exp(np.euler_gamma)  # mean of squares of a normal distribution over their geometric mean
+_HIGH = 7.1  # (1 - p)^6 of weights p of a Gaussian: 1 + 7.1 times the sum of their squares remains for a single point
+_STAYS = 1.4  # variance of noise over that of what a fit to 24 neighbours takes away
+_GAUSSIAN = 0.8  # variance of a Gaussian that leaves as much noise as the weights of the pairs, over that of these
+_LEAST = 1e-3  # noise below this share of the spacing is none, such as that of rounded coordinates
+
+
+@dataclass(frozen=True)
+class Settled:
+    """A quantity with as much averaging as its noise asks for.
+
+    Attributes
+    ----------
+    values : ndarray, (n, k)
+    variance : ndarray, (n,)
+        What noise leaves in them, the sum over all k.
+    """
+
+    values: Floats
+    variance: Floats
+
+
+class Averages:
+    """Averages over the neighbours of an operator, and how much noise they leave.
+
+    A second derivative of white noise, of deviation sigma, on points that take the area a each, seen through a Gaussian
+    of variance w along each axis, has the variance ``sigma^2 a / (8 pi w^3)``: that of the mean curvature, and that of
+    half the difference of principal curvatures in both its components together. A quadric is such a Gaussian, as wide
+    as its own scatter says; each average adds the second moment of its weights to w.
+
+    Parameters
+    ----------
+    laplacian : LaplaceBeltrami
+    """
+
+    def __init__(self, laplacian: LaplaceBeltrami) -> None:
+        self._pairs, self._window, uneven = _matrices(laplacian)
+        diagonal = laplacian.stiffness.diagonal()
+        diagonal = np.where(diagonal > 0.0, diagonal, 1.0)
+        area = self._around(laplacian.areas)
+        area = np.where(area > 0.0, area, 1.0)  # of points without pairs
+        moved = laplacian.points - laplacian.surface_points
+        moved = np.einsum("ij,ij->i", moved, laplacian.normals)
+        points = laplacian.surface_points - laplacian.surface_points.mean(axis=0)
+        bent = np.einsum("ij,ij->i", off_neighbors(laplacian, laplacian.apply(points, raw=True), 2), laplacian.normals)
+        height = bent * laplacian.areas / diagonal
+        squares = height**2 / (1.0 + _HIGH * uneven) + _STAYS * moved**2
+        # The geometric mean: few points at an edge are no noise.
+        noise = _LOG * np.exp(self._around(np.log(squares + 1e-12 * area), _NOISE_ROUNDS))
+        self.noisy = noise > _LEAST**2 * area
+        self._unit = noise / (8.0 * np.pi * area**2)  # of variances; widths are in units of the area
+        scatter = self._around(laplacian.curvature_scatter**2)
+        self._quadric = np.cbrt(1.0 / (8.0 * np.pi * np.where(scatter > 0.0, scatter, 1.0))) / np.cbrt(area) ** 2
+        wider = _GAUSSIAN * self._around(2.0 * laplacian.areas / diagonal) / area
+        self._wider = np.where(wider > 0.0, wider, 1.0)
+
+    def of(self, values: Floats) -> list[Floats]:
+        """Return values at the points, (n, ...), averaged as often as `ROUNDS` says, those of the other side negated."""
+        shape, result = values.shape, [values.reshape(len(values), -1)]
+        for before, after in zip(ROUNDS[:-1], ROUNDS[1:], strict=True):
+            result.append(_repeat(self._pairs, result[-1], after - before))
+        return [each.reshape(shape) for each in result]
+
+    def settle(self, averaged: list[Floats]) -> Settled:
+        """Return of averages of a curvature, (n, k) each, the one of least error, or what lies between two of them.
+
+        A step to more averaging changes values by noise, which is known beforehand, and else by bias. That grows with
+        the width, so that it shows what bias there was before. Of both follows the share of the step that leaves least.
+        """
+        width = [self._quadric + rounds * self._wider for rounds in ROUNDS]
+        variance = [self._unit / each**3 for each in width]
+        changes = self._windows([_squares(after - before) for before, after in zip(averaged, averaged[1:], strict=False)])
+        values, left = averaged[-1], variance[-1]
+        for step in reversed(range(len(changes))):
+            before, after = width[step], width[step + 1]
+            common = self._unit / (0.5 * (before + after)) ** 3
+            chance = variance[step] + variance[step + 1] - 2.0 * common
+            bias = np.maximum(changes[step] - _CHANCE * chance, 0.0)
+            gain = variance[step] - common - bias * before / (after - before)
+            share = np.clip(gain / (chance + bias), 0.0, 1.0)
+            values = averaged[step] + share[:, None] * (values - averaged[step])
+            left = (1.0 - share) ** 2 * variance[step] + 2.0 * share * (1.0 - share) * common + share**2 * left
+        return Settled(values, left)
+
+    def mean_square(self, values: Floats, rounds: int) -> Floats:
+        """Return the mean over the neighbours of squares of values, (n, k), summed over k, (n,)."""
+        return self._around(_squares(values), rounds)
+
+    def _windows(self, values: list[Floats]) -> list[Floats]:
+        """Return the means of values, (n,), over their windows, which grow from one to the next."""
+        columns, done = np.stack(values, axis=1), 0
+        result = []
+        for number, rounds in enumerate(_WINDOWS):
+            columns, done = _repeat(self._window, columns, rounds - done), rounds
+            result.append(columns[:, number])
+        return result
+
+    def _around(self, values: Floats, rounds: int = 2) -> Floats:
+        return _repeat(self._window, values, rounds)
+
+
+def off_neighbors(laplacian: LaplaceBeltrami, values: Floats, rounds: int) -> Floats:
+    """Return how far values are off the mean of their neighbours by the weights of the stiffness, (n, k).
+
+    Twice of it is of fourth order for what varies with the place, and all of what changes from point to point.
+    """
+    weight = laplacian.stiffness.diagonal()
+    weight = np.where(weight > 0.0, weight, 1.0)[:, None]
+    for _ in range(rounds):
+        values = (laplacian.stiffness @ values) / weight
+    return values
+
+
+def _matrices(laplacian: LaplaceBeltrami) -> tuple[sparse.csr_array, sparse.csr_array, Floats]:
+    """Return the mean over neighbours by the operator's weights, the mean over them and the point alike, and unevenness.
+
+    The first takes values of neighbours whose normal points to the other side with the other sign, and those beyond an
+    edge at right angles not at all.
+
+    Returns
+    -------
+    csr_array, (n, n)
+    csr_array, (n, n)
+    ndarray, (n,)
+        Sums of the squared weights of each point.
+    """
+    stiffness, normals = laplacian.stiffness, laplacian.normals
+    count = np.diff(stiffness.indptr)
+    rows = np.repeat(np.arange(len(count), dtype=stiffness.indices.dtype), count)
+    side = sum(normals[rows, axis] * normals[stiffness.indices, axis] for axis in range(3))
+    weight = np.where(rows == stiffness.indices, 0.0, np.maximum(-stiffness.data, 0.0) * side)
+    total = np.bincount(rows, np.abs(weight), len(count))
+    weight /= np.where(total > 0.0, total, 1.0)[rows]
+    alike = 1.0 / np.maximum(count, 1)[rows]
+    return _like(stiffness, weight), _like(stiffness, alike), np.bincount(rows, weight**2, len(count))
+
+
+def _like(matrix: sparse.csr_array, data: Array) -> sparse.csr_array:
+    return sparse.csr_array((data, matrix.indices, matrix.indptr), shape=matrix.shape)
+
+
+def _repeat(matrix: sparse.csr_array, values: Floats, rounds: int) -> Floats:
+    for _ in range(rounds):
+        values = matrix @ values
+    return values
+
+
+def _squares(values: Floats) -> Floats:
+    squares: Floats = (values**2).sum(axis=1)
+    return squares
