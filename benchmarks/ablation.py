@@ -68,6 +68,7 @@ UNTUNED = {  # why a number is no constant: its names, with the module where oth
     "rounds after which an iteration has long ended": ("moments._STEPS", "edges._ROUNDS"),
     "how many terms there are": ("TERMS", "edges._COEFFICIENTS"),
     "what only a notice or a drawing goes by": ("_NARROW", "bandwidth._STEPS", "cloud._DRAWN"),
+    "what the matrix does not go by": ("quadrics._FADING",),
 }
 DOCUMENT = Path(__file__).parents[1] / "docs" / "ablation.md"
 NOTE = """\

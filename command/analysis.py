@@ -15,7 +15,17 @@ class Built(NamedTuple):
     """An operator and the mean curvature computed by it."""
 
     laplacian: "core.LaplaceBeltrami"
-    mean_curvature: np.ndarray
+    curvature: "core.MeanCurvature"
+
+    @property
+    def mean_curvature(self) -> np.ndarray:
+        """The mean curvature, (n,)."""
+        return self.curvature.values
+
+    @property
+    def notices(self) -> list:
+        """Notices about the operator and about the curvature."""
+        return [*self.laplacian.notices, *self.curvature.notices]
 
     @property
     def measures(self) -> dict:
@@ -44,14 +54,15 @@ def build(points, options, boundary, left_out, progress) -> Built:
         laplacian = core.build_laplacian(points, options=options, boundary=boundary, **given)
     progress("Curvature", 1.0)
     laplacian = replace(laplacian, notices=[*floating_notices(left_out), *laplacian.notices])
-    return Built(laplacian, core.mean_curvature(laplacian))
+    return Built(laplacian, core.measure_mean_curvature(laplacian))
 
 
 def oriented(built, orientation) -> Built:
     """Return the same with normals turned to the side of some vectors, (n, 3)."""
     laplacian = built.laplacian.toward(orientation)
     kept = np.einsum("ij,ij->i", laplacian.normals, built.laplacian.normals) > 0.0
-    return Built(laplacian, np.where(kept, built.mean_curvature, -built.mean_curvature))
+    values = np.where(kept, built.mean_curvature, -built.mean_curvature)
+    return Built(laplacian, replace(built.curvature, values=values))
 
 
 def floating_notices(out) -> list:

@@ -64,7 +64,7 @@ class PrincipalCurvatures(ResultVerb):
     def compute(self, built, wanted, name, own, progress):
         found = core.principal_curvatures(built.laplacian)
         values = {row.attribute: row.of(found) for row in rows_of(self.operator)}
-        return Told(values, [], f"{name}: {results.curvature_line(found)}")
+        return Told(values, found.notices, f"{name}: {results.curvature_line(found)}")
 
 
 class SurfaceVariation(ResultVerb):

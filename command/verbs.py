@@ -143,7 +143,7 @@ class Analyze(Frames, SurfaceVerb):
             modes = {eigenvector_name(number): vector for number, vector in enumerate(vectors, 1)}
             everything = analysis.arrays(cloud.place, built, spectrum) if output.suffix.lower() == ".npz" else None
             written = clouds.write(output, given, {**measures, **modes}, everything)
-        return {**analysis.figures(measures, spectrum), **matched}, [*laplacian.notices, *notices, *written]
+        return {**analysis.figures(measures, spectrum), **matched}, [*built.notices, *notices, *written]
 
 
 class Measure(SurfaceVerb):

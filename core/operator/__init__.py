@@ -2,14 +2,14 @@
 
 from .areas import KernelMatrix, estimate_areas, solve_areas
 from .connection import connection_laplacian, tangent_frames
-from .curvature import (
+from .implicit import Heights, ImplicitSurface
+from .laplacian import LaplaceBeltrami, assemble_laplacian, build_laplacian, laplacian_of, narrow_laplacian
+from .principal import (
     MeanCurvature,
     PrincipalCurvatures,
     mean_curvature,
     measure_mean_curvature,
     principal_curvatures,
 )
-from .implicit import Heights, ImplicitSurface
-from .laplacian import LaplaceBeltrami, assemble_laplacian, build_laplacian, laplacian_of, narrow_laplacian
 from .spectrum import Spectrum, symmetric_form
 from .stiffness import Stiffness, stiffness_matrix

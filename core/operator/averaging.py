@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -74,9 +75,9 @@ class Averages:
         self._wider = np.where(wider > 0.0, wider, 1.0)
 
     def of(self, values: Floats) -> list[Floats]:
-        """Return values at the points, (n, ...), averaged as often as `ROUNDS` says, those of the other side negated."""
+        """Return values at the points, (n, ...), averaged as often as `ROUNDS` says, of the other side negated."""
         shape, result = values.shape, [values.reshape(len(values), -1)]
-        for before, after in zip(ROUNDS[:-1], ROUNDS[1:], strict=True):
+        for before, after in itertools.pairwise(ROUNDS):
             result.append(_repeat(self._pairs, result[-1], after - before))
         return [each.reshape(shape) for each in result]
 
@@ -88,7 +89,8 @@ class Averages:
         """
         width = [self._quadric + rounds * self._wider for rounds in ROUNDS]
         variance = [self._unit / each**3 for each in width]
-        changes = self._windows([_squares(after - before) for before, after in zip(averaged, averaged[1:], strict=False)])
+        steps = zip(averaged[:-1], averaged[1:], _WINDOWS, strict=True)
+        changes = [self.mean_square(after - before, rounds) for before, after, rounds in steps]
         values, left = averaged[-1], variance[-1]
         for step in reversed(range(len(changes))):
             before, after = width[step], width[step + 1]
@@ -104,15 +106,6 @@ class Averages:
     def mean_square(self, values: Floats, rounds: int) -> Floats:
         """Return the mean over the neighbours of squares of values, (n, k), summed over k, (n,)."""
         return self._around(_squares(values), rounds)
-
-    def _windows(self, values: list[Floats]) -> list[Floats]:
-        """Return the means of values, (n,), over their windows, which grow from one to the next."""
-        columns, done = np.stack(values, axis=1), 0
-        result = []
-        for number, rounds in enumerate(_WINDOWS):
-            columns, done = _repeat(self._window, columns, rounds - done), rounds
-            result.append(columns[:, number])
-        return result
 
     def _around(self, values: Floats, rounds: int = 2) -> Floats:
         return _repeat(self._window, values, rounds)
@@ -131,7 +124,7 @@ def off_neighbors(laplacian: LaplaceBeltrami, values: Floats, rounds: int) -> Fl
 
 
 def _matrices(laplacian: LaplaceBeltrami) -> tuple[sparse.csr_array, sparse.csr_array, Floats]:
-    """Return the mean over neighbours by the operator's weights, the mean over them and the point alike, and unevenness.
+    """Return two means over the neighbours: by the operator's weights, and of all of them and the point alike.
 
     The first takes values of neighbours whose normal points to the other side with the other sign, and those beyond an
     edge at right angles not at all.
@@ -143,15 +136,16 @@ def _matrices(laplacian: LaplaceBeltrami) -> tuple[sparse.csr_array, sparse.csr_
     ndarray, (n,)
         Sums of the squared weights of each point.
     """
-    stiffness, normals = laplacian.stiffness, laplacian.normals
+    stiffness = laplacian.stiffness
     count = np.diff(stiffness.indptr)
-    rows = np.repeat(np.arange(len(count), dtype=stiffness.indices.dtype), count)
-    side = sum(normals[rows, axis] * normals[stiffness.indices, axis] for axis in range(3))
-    weight = np.where(rows == stiffness.indices, 0.0, np.maximum(-stiffness.data, 0.0) * side)
-    total = np.bincount(rows, np.abs(weight), len(count))
-    weight /= np.where(total > 0.0, total, 1.0)[rows]
-    alike = 1.0 / np.maximum(count, 1)[rows]
-    return _like(stiffness, weight), _like(stiffness, alike), np.bincount(rows, weight**2, len(count))
+    weight = np.zeros(len(stiffness.data))
+    for axis in np.ascontiguousarray(laplacian.normals.T):
+        weight += np.repeat(axis, count) * axis[stiffness.indices]
+    weight *= np.maximum(-stiffness.data, 0.0)  # all but those on the diagonal
+    each, every = np.ones(len(count)), np.repeat(1.0 / np.maximum(count, 1), count)
+    total = _like(stiffness, np.abs(weight)) @ each
+    weight /= np.repeat(np.where(total > 0.0, total, 1.0), count)
+    return _like(stiffness, weight), _like(stiffness, every), _like(stiffness, weight**2) @ each
 
 
 def _like(matrix: sparse.csr_array, data: Array) -> sparse.csr_array:

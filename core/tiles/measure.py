@@ -28,7 +28,7 @@ class Measured:
     surface_points
         As of `LaplaceBeltrami`.
     mean_curvature : ndarray, (k,)
-        By the operator, see `core.mean_curvature`.
+        See `core.mean_curvature`.
     component : ndarray, (k,) int
         By the numbers that all tiles agree on; -1 for points left out.
     stiffness : csr_array, (k, n)
@@ -100,10 +100,10 @@ def measure_tile(
     part = build_laplacian(points[tile.rows], options=options, agreed=agreed.among(tile.rows, count), progress=progress)
     label = agreed.component if agreed.sheet is None else agreed.sheet
     rows = part.stiffness[inner]
-    found = results(part, None if label is None else label[tile.rows], inner)
+    found, notices = results(part, None if label is None else label[tile.rows], inner)
     return Measured(
         rows=tile.rows[inner],
         **found,
         stiffness=sparse.csr_array((rows.data, tile.rows[rows.indices], rows.indptr), shape=(len(inner), count)),
-        notices=part.notices,
+        notices=notices,
     )

@@ -18,7 +18,7 @@ from ..geometry import (
     side_sums,
     signs_by_sums,
 )
-from ..operator import LaplaceBeltrami, assemble_laplacian, mean_curvature, solve_areas
+from ..operator import LaplaceBeltrami, assemble_laplacian, measure_mean_curvature, solve_areas
 from ..options import LaplacianOptions
 from ..types import Array, Floats, Ints
 from .labels import agree_on_signs, starts
@@ -140,12 +140,15 @@ def measure(site: Site, solved: Solved) -> tuple[None, Told]:
     cloud = replace(cloud, decisions=decisions)
     laplacian = assemble_laplacian(site.part.points, cloud, solved.areas * site.record["ratio"][names], site.options)
     inner = site.part.inner
-    told = {**results(laplacian, site.labels(), np.flatnonzero(inner)), **tell_roughness(site, laplacian)}
-    return None, {**told, "notices": np.array(laplacian.notices, dtype=str)}
+    found, notices = results(laplacian, site.labels(), np.flatnonzero(inner))
+    return None, {**found, **tell_roughness(site, laplacian), "notices": np.array(notices, dtype=str)}
 
 
-def results(laplacian: LaplaceBeltrami, label: Ints | None, rows: Ints) -> Told:
-    """Return the results at some points of a tile, by the names of `Measured`; components by labels of all, (k,)."""
+def results(laplacian: LaplaceBeltrami, label: Ints | None, rows: Ints) -> tuple[Told, list[str]]:
+    """Return the results at some points of a tile, by the names of `Measured`, and notices.
+
+    Components are by labels of all, (k,).
+    """
     component = laplacian.component[rows]
     found = {
         name: getattr(laplacian, name)[rows]
@@ -161,9 +164,10 @@ def results(laplacian: LaplaceBeltrami, label: Ints | None, rows: Ints) -> Told:
             "surface_points",
         )
     }
-    found["mean_curvature"] = mean_curvature(laplacian)[rows]
+    curvature = measure_mean_curvature(laplacian)
+    found["mean_curvature"] = curvature.values[rows]
     found["component"] = component if label is None else np.where(component < 0, -1, label[rows])
-    return found
+    return found, [*laplacian.notices, *curvature.notices]
 
 
 def _added(shelf: Shelf, step: str, name: str) -> Floats:

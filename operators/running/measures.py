@@ -44,12 +44,12 @@ class Measured(NamedTuple):
     def notices(self) -> list:
         """Notices about the operator, and about the number of points that it was built on."""
         if self.prolongation is None:
-            return self.built.laplacian.notices
+            return self.built.notices
         notice = (
             f"Analyzed {len(self.subset):,} of {len(self.prolongation.nearest):,} points, evenly spread over the"
             " surface, and transferred the results to all. The setting Point Budget decides how many."
         )
-        return [notice, *floating_notices(self.left_out), *self.built.laplacian.notices]
+        return [notice, *floating_notices(self.left_out), *self.built.notices]
 
 
 def measure(points, options, boundary, budget, modes, progress, orientation=None, splats=None) -> Measured:

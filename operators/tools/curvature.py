@@ -66,7 +66,7 @@ class Curvatures(Tool):
         for row in rows_of("principal_curvatures"):
             write_attribute(obj.data, row.attribute, row.of(result))
         tag_changed(obj.data)
-        return [f"{obj.name}: {curvature_line(result)}"]
+        return [*result.notices, f"{obj.name}: {curvature_line(result)}"]
 
 
 class MESHFREE_OT_principal_curvatures(Curvatures, ShownOperator, bpy.types.Operator):
