@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 ROUNDS = (0, 1, 2, 4, 8)  # of averaging that are compared; the last reaches as far as halos of tiles allow
 _WINDOWS = 3, 3, 5, 8  # rounds over which a change by averaging is measured: those around say the same, but not chance
 _CHANCE = 1.5  # times what noise alone would change: more is bias
-_NOISE_ROUNDS = 3  # over which noise is measured
+_NOISE_ROUNDS = 4  # over which noise is measured
 _LOG = 2.0 * np.exp(np.euler_gamma)  # mean of squares of a normal distribution over their geometric mean
 _HIGH = 7.1  # (1 - p)^6 of weights p of a Gaussian: 1 + 7.1 times the sum of their squares remains for a single point
 _STAYS = 1.4  # variance of noise over that of what a fit to 24 neighbours takes away
