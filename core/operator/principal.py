@@ -132,10 +132,10 @@ def _notices(laplacian: LaplaceBeltrami, averages: Averages, size: Floats, scatt
     decided = known & averages.noisy & (scatter > _DECIDES * size)
     if 2 * np.count_nonzero(decided) <= np.count_nonzero(known):
         return []
+    share = np.count_nonzero(decided) / np.count_nonzero(known)
     return [
-        f"Noise decides the {what}: at {np.count_nonzero(decided) / np.count_nonzero(known):.0%} of the points it is"
-        " about as large as what noise leaves in it. The surface may be flat; if not, a greater Bandwidth Factor"
-        " averages over more points."
+        f"Noise decides the {what}: at {share:.0%} of the points values are less than twice what noise leaves in them."
+        " The surface may be flat; if not, a greater Bandwidth Factor averages over more points."
     ]
 
 
