@@ -8,11 +8,10 @@ from time import perf_counter
 
 import bpy
 
-import package
 import studio
 from coral import Coral
 
-OUTPUT = package.ROOT / "build" / "demo"
+OUTPUT = Path("build", "demo")  # in the present folder, which in_blender.py lets be the tree
 MODES = 30
 SHOWN = 20
 POINTS = 20_000
@@ -55,7 +54,7 @@ def demonstrate(scan, up):
     print(f"eigenvalues  {', '.join(f'{value:.4g}' for value in values[:8])}, ...")
 
     began = perf_counter()
-    blend, picture, photograph = (OUTPUT / name for name in ("demo.blend", "demo.png", "scan.png"))
+    blend, picture, photograph = (OUTPUT.absolute() / name for name in ("demo.blend", "demo.png", "scan.png"))
     photograph.unlink(missing_ok=True)
     with studio.silence():
         studio.set_up(bpy.context.scene, obj)
@@ -65,7 +64,7 @@ def demonstrate(scan, up):
     colors = ", and its own colors" if photograph.exists() else ""
     print(f"picture      {perf_counter() - began:.2f} s, mode {SHOWN}{colors}")
     for path in filter(Path.exists, (blend, picture, photograph)):
-        print(f"written      {path.relative_to(package.ROOT)}")
+        print(f"written      {path.relative_to(Path.cwd())}")
 
 
 def picture_of_colors(scene, obj, path):

@@ -4,6 +4,7 @@ import functools
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -13,7 +14,7 @@ import package
 
 from .clouds import sphere_points
 
-SCAN = package.ROOT / "build" / "demo" / "scan.png"
+FOLDER = Path("build", "demo")
 SMALL = {"size": (320, 200), "samples": 4}
 RUN = f"""
 import functools, studio
@@ -35,7 +36,7 @@ def test_the_demonstration_shows_a_scan_in_its_colors(tmp_path):
             "BLENDER_USER_RESOURCES": str(tmp_path / "user"),
             "PYTHONPATH": str(package.ROOT / "scripts"),
         },
-        cwd=package.ROOT,
+        cwd=tmp_path,
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
@@ -43,12 +44,13 @@ def test_the_demonstration_shows_a_scan_in_its_colors(tmp_path):
     )
     for line in ("points       600", "written      build/demo/demo.png", "written      build/demo/scan.png"):
         assert line in done.stdout, done.stdout + done.stderr
-    picture = bpy.data.images.load(str(SCAN))
+    written = tmp_path / FOLDER
+    picture = bpy.data.images.load(str(written / "scan.png"))
     pixels = np.array(picture.pixels).reshape(picture.size[1], picture.size[0], -1)
     red, green, blue = pixels[75:125, 135:185, :3].mean(axis=(0, 1))
     assert red > 0.5
     assert max(green, blue) < 0.2
-    bpy.ops.wm.open_mainfile(filepath=str(SCAN.with_name("demo.blend")))
+    bpy.ops.wm.open_mainfile(filepath=str(written / "demo.blend"))
     assert "Color" in [
         node.attribute_name
         for material in bpy.data.materials
@@ -62,11 +64,13 @@ def test_of_a_scan_without_colors_there_is_one_picture(capfd, tmp_path, monkeypa
     import studio
 
     monkeypatch.setattr(studio, "set_up", functools.partial(studio.set_up, **SMALL))
-    SCAN.parent.mkdir(parents=True, exist_ok=True)
-    SCAN.touch()  # of a run before
+    monkeypatch.chdir(tmp_path)
+    photograph = tmp_path / FOLDER / "scan.png"
+    photograph.parent.mkdir(parents=True)
+    photograph.touch()  # of a run before
     np.savetxt(tmp_path / "scan.xyz", sphere_points(600))
     demo.demonstrate(tmp_path / "scan.xyz", "Z")
     told = capfd.readouterr().out
     assert "written      build/demo/demo.png" in told
     assert "scan.png" not in told
-    assert not SCAN.exists()
+    assert not photograph.exists()
