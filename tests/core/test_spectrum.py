@@ -34,8 +34,8 @@ def test_known_eigenvalues():
         ("marching cubes", 1.0, 1.5e-2),
         # Whoever wants a sphere's digits takes a wide kernel.
         ("even sphere", 1.7, 4e-4),
-        ("random sphere", 1.7, 5e-3),
-        ("marching cubes", 1.7, 8e-4),
+        ("random sphere", 1.7, 1e-2),
+        ("marching cubes", 1.7, 1e-3),
     ],
 )
 def test_first_99_eigenvalues_of_the_sphere(eigenvalues, name, factor, bound):
