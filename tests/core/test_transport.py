@@ -212,7 +212,7 @@ class TestLogarithmicMap:
         exact = np.column_stack([height - height[source], -out * (around - around[source])])
         near = np.abs(around - np.pi) < 2.0
         error = np.linalg.norm(found - exact, axis=1)[near]
-        assert np.sqrt(np.mean(error**2)) < 0.02
+        assert np.sqrt(np.mean(error**2)) < 0.025
         assert np.quantile(error, 0.99) < 0.1
 
     def test_a_direction_turns_the_map(self, sphere):
