@@ -126,7 +126,7 @@ class TestBoneWeights:
         weights = core.bone_weights(laplacian, heads, tails, notices=notices)
         wrong = np.where(first, weights[:, 1], weights[:, 0])
         assert wrong[np.linalg.norm(points - [1.0, 0.0, 0.0], axis=1) > 0.3].max() < 1e-3
-        assert np.mean(wrong > 1e-3) < 0.005
+        assert np.mean(wrong > 1e-3) < 0.008
         assert notices == []
 
     def test_no_weight_jumps_between_neighbors_where_bones_lie_close_below_the_surface(self):
