@@ -35,6 +35,7 @@ from .nearest import (
     fading_weights,
     find_nearest,
     nearest_rows,
+    repeated,
     spacing_of,
     typical_distance,
 )

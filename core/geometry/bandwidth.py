@@ -1,7 +1,6 @@
 """Smoothing lengths: how wide the kernel is at every point."""
 
 import numpy as np
-from scipy import sparse
 from scipy.spatial import cKDTree
 
 from ..cores import cores
@@ -12,7 +11,7 @@ from .agreed import Decisions
 from .boundary import Boundary
 from .cells import Cells
 from .moments import MET, least_error
-from .nearest import ENOUGH, GAP, POWER, ROUNDS, Nearest
+from .nearest import ENOUGH, GAP, POWER, ROUNDS, Nearest, repeated
 from .quadrics import Quadrics
 
 _NARROWEST = 1.08  # h over the radius of the cells
@@ -64,7 +63,7 @@ def smoothing_lengths(
     """
     if options.bandwidth == "adaptive":
         lengths = options.bandwidth_factor * _NARROWEST * mean_gaps(nearest, cells.radius, POWER)
-        cell = _repeat(nearest.averaging(), cells.areas, ROUNDS)
+        cell = repeated(nearest.averaging(), cells.areas, ROUNDS)
         lengths = np.maximum(lengths, options.bandwidth_factor * np.sqrt(ENOUGH / np.pi * cell) / SUPPORT)
         return lengths * _widening(nearest, normals, quadrics, cells, boundary, lengths)
     if options.bandwidth == "global":
@@ -73,7 +72,7 @@ def smoothing_lengths(
         )
         return np.full(len(normals), options.bandwidth_factor * found)
     distance = neighbor_distance(nearest.tree, options.neighbors, component)
-    return options.bandwidth_factor * _repeat(nearest.averaging(), distance, 2)
+    return options.bandwidth_factor * repeated(nearest.averaging(), distance, 2)
 
 
 def _widening(
@@ -116,7 +115,7 @@ def mean_gaps(nearest: Nearest, radius: Floats, power: int) -> Floats:
         Of the mean: in the eighth the widest gaps decide.
     """
     radius = np.minimum(radius, GAP * nearest.spacing)
-    return _repeat(nearest.averaging(), radius**power, ROUNDS) ** (1.0 / power)
+    return repeated(nearest.averaging(), radius**power, ROUNDS) ** (1.0 / power)
 
 
 def depth(nearest: Nearest, inside: Floats) -> Floats:
@@ -149,9 +148,3 @@ def neighbor_distance(tree: cKDTree, neighbors: int, component: Ints | None) -> 
             furthest = tree.query(tree.data[rows], k=[few + 1], workers=cores())[0][:, 0]
             distance[rows] = furthest * np.sqrt(neighbors / few)
     return distance
-
-
-def _repeat(matrix: sparse.csr_array, values: Floats, rounds: int) -> Floats:
-    for _ in range(rounds):
-        values = matrix @ values
-    return values

@@ -5,9 +5,9 @@ from enum import IntEnum
 
 import numpy as np
 
-from ..types import Floats, Ints
+from ..types import Array, Floats, Ints
 from .cells import Cells
-from .nearest import ON, ROUNDS, Nearest, fading_weights
+from .nearest import ON, ROUNDS, Nearest, fading_weights, repeated
 from .noise import FILLING
 
 _OWN = 0.5  # share of what a quadric misses all neighbours by, that one through the own sheet misses it by at most
@@ -101,7 +101,6 @@ def _agreement(nearest: Nearest, normals: Floats) -> Floats:
     """Return the mean squared cosine of the normals around every point to the direction that they agree with most."""
     averaging = replace(nearest, weight=fading_weights(nearest.distance)).averaging()  # over all sheets
     products = np.einsum("ia,ib->iab", normals, normals).reshape(-1, 9)
-    for _ in range(ROUNDS // 2):
-        products = averaging @ products
-    largest: Floats = np.linalg.eigvalsh(products.reshape(-1, 3, 3))[:, 2]
+    products = repeated(averaging, products, ROUNDS // 2)
+    largest: Array = np.linalg.eigvalsh(products.reshape(-1, 3, 3))[:, 2]
     return largest

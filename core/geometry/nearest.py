@@ -122,6 +122,13 @@ class Nearest:
         return sparse.csr_array((weight.ravel(), self.index.ravel(), start), shape=(count, count))
 
 
+def repeated(averaging: sparse.csr_array, values: Floats, rounds: int) -> Floats:
+    """Return quantities of points, (m, ...), after so many products with a matrix of means."""
+    for _ in range(rounds):
+        values = averaging @ values
+    return values
+
+
 def find_nearest(points: Floats) -> Nearest:
     """Find the 40 nearest neighbours of every point, (m, 3)."""
     tree = cKDTree(points)

@@ -5,7 +5,7 @@ from scipy.spatial import cKDTree
 
 from ..algebra import blocks, on_all_cores
 from ..types import Floats, Ints
-from .nearest import COUNT, ENOUGH, ROUNDS, Nearest, fading_weights
+from .nearest import COUNT, ENOUGH, ROUNDS, Nearest, fading_weights, repeated
 from .quadrics import fit_quadrics
 
 _SHAPE = 1.6  # a fit to 40 that misses so much more: noise misses both nearly alike, an edge by their distance
@@ -41,9 +41,7 @@ def mean_misfits(nearest: Nearest, *misfits: Floats) -> Floats:
     """
     averaging = nearest.averaging()
     logarithms = np.log(np.maximum(np.stack(misfits, axis=1) / nearest.spacing[:, None], 1e-12))
-    for _ in range(ROUNDS // 2):
-        logarithms = averaging @ logarithms
-    means: Floats = np.exp(logarithms.T)
+    means: Floats = np.exp(repeated(averaging, logarithms, ROUNDS // 2).T)
     return means
 
 

@@ -164,7 +164,7 @@ class KernelMatrix:
         return self._diagonal * values + first + second
 
 
-def fast_areas(matrix: KernelMatrix, target: Floats, cells: Floats, degree: int = _DEGREE) -> Floats:
+def fast_areas(matrix: KernelMatrix, target: Floats, cells: Floats) -> Floats:
     """Solve A v = b by two projected rounds of polynomials in A, from the areas c of the Voronoi cells.
 
     M = V0^(1/2) A V0^(1/2) with v0 = c / (A c) has its eigenvalues in [-1, 1]; but for pairs left out between close
@@ -183,8 +183,6 @@ def fast_areas(matrix: KernelMatrix, target: Floats, cells: Floats, degree: int 
         b, the integral that the kernel should have at each point (1 on a flat surface).
     cells : ndarray, (n,)
         Areas of the Voronoi cells.
-    degree : int
-        Of the polynomial of the first round; that of the second has half of it.
 
     Returns
     -------
@@ -195,7 +193,7 @@ def fast_areas(matrix: KernelMatrix, target: Floats, cells: Floats, degree: int 
     right, y = root * target, cells / root
     floor = _FLOOR * y
     held = np.zeros(len(target), dtype=bool)
-    for many in (degree, degree // 2):
+    for many in (_DEGREE, _DEGREE // 2):
         residual = right - root * (matrix @ (root * y))
         held &= residual < 0.0
         residual[held] = 0.0

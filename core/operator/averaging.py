@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import sparse
 
+from ..geometry import repeated
 from ..types import Array, Floats
 
 if TYPE_CHECKING:
@@ -78,7 +79,7 @@ class Averages:
         """Return values at the points, (n, ...), averaged as often as `ROUNDS` says, of the other side negated."""
         shape, result = values.shape, [values.reshape(len(values), -1)]
         for before, after in itertools.pairwise(ROUNDS):
-            result.append(_repeat(self._pairs, result[-1], after - before))
+            result.append(repeated(self._pairs, result[-1], after - before))
         return [each.reshape(shape) for each in result]
 
     def settle(self, averaged: list[Floats]) -> Settled:
@@ -105,10 +106,10 @@ class Averages:
 
     def mean_square(self, values: Floats, rounds: int) -> Floats:
         """Return the mean over the neighbours of squares of values, (n, k), summed over k, (n,)."""
-        return self._around(_squares(values), rounds)
+        return self._around((values**2).sum(axis=1), rounds)
 
     def _around(self, values: Floats, rounds: int = 2) -> Floats:
-        return _repeat(self._window, values, rounds)
+        return repeated(self._window, values, rounds)
 
 
 def off_neighbors(laplacian: LaplaceBeltrami, values: Floats, rounds: int) -> Floats:
@@ -150,14 +151,3 @@ def _matrices(laplacian: LaplaceBeltrami) -> tuple[sparse.csr_array, sparse.csr_
 
 def _like(matrix: sparse.csr_array, data: Array) -> sparse.csr_array:
     return sparse.csr_array((data, matrix.indices, matrix.indptr), shape=matrix.shape)
-
-
-def _repeat(matrix: sparse.csr_array, values: Floats, rounds: int) -> Floats:
-    for _ in range(rounds):
-        values = matrix @ values
-    return values
-
-
-def _squares(values: Floats) -> Floats:
-    squares: Floats = (values**2).sum(axis=1)
-    return squares

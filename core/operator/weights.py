@@ -82,9 +82,8 @@ def balance_weights(
     goal = np.zeros((len(areas), TERMS))
     goal[:, 0] = 1.0
     terms, step = np.zeros_like(goal), np.zeros_like(goal)
-    rates = chebyshev_steps(
-        _FASTEST / (1.0 + 0.25 * _ROUNDS**2), _FASTEST
-    )  # so many rounds reduce these to 1 / cosh(4)
+    slowest = _FASTEST / (1.0 + 0.25 * _ROUNDS**2)  # what so many rounds reduce to 1 / cosh(4)
+    rates = chebyshev_steps(slowest, _FASTEST)
     for number in range(_ROUNDS + 1):
         missing = goal - moments.of(terms)
         residual = np.linalg.norm(missing, axis=1)
