@@ -8,7 +8,7 @@ from scipy import sparse
 
 from ..types import Array, Floats, Ints
 
-_PAIRS = 1 << 15  # of a patch, about: of more, the system clears memory each time; of fewer, Python's share grows
+_PAIRS = 1 << 16  # of a patch, about: of fewer, and Python's share of the work grows
 
 
 @dataclass(frozen=True)
