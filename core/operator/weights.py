@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from ..geometry import Cloud, Patch
 
 _ROUNDS = 16  # of the solver, at most
+_SMALLEST = 1e-6  # error of the moments that is none: with a larger one results would depend on where a cloud lies
 _FASTEST = 2.5  # bound of the eigenvalues of the equations over those of single points: 2, but these change on the way
 
 
@@ -87,7 +88,7 @@ def balance_weights(
     for number in range(_ROUNDS + 1):
         missing = goal - moments.of(terms)
         residual = np.linalg.norm(missing, axis=1)
-        met = residual < MET * lengths  # what a first moment makes of a slope
+        met = residual < _SMALLEST
         if number == _ROUNDS or met.all():
             break
         if number < 2:  # from the kernel's weights to nearly the end in the first round, half a step
