@@ -43,7 +43,7 @@ def test_a_legend_is_as_high_as_what_it_holds(overlay, cloud):
 
 def test_a_legend_names_the_causes_of_doubt(core, overlay):
     """In the order of core's numbers, and in the colors of these; the histogram has room for the outer names only."""
-    obj = add_object(np.random.default_rng(0).uniform(-1.0, 1.0, (1000, 3)))
+    obj = add_object(np.random.default_rng(0).uniform(-1.0, 1.0, (1200, 3)))
     bpy.ops.meshfree.analyze()
     doubt = attribute(obj, "lb_doubt")
     assert np.count_nonzero(doubt == core.Doubt.VOLUME) > 100

@@ -61,11 +61,11 @@ def test_nothing_flows_between_loose_parts_that_touch(strip, halves):
 
 def test_little_flows_between_bodies_that_touch_at_a_point():
     """Where the operator's normals of one are reversed; what flows next to the contact fades from there."""
-    points, first = touching_balls()
+    points, first = touching_balls(4000)  # 0.3 is five spacings: within the reach of a kernel chance decides
     hard = np.column_stack([first, ~first]).astype(float)
     change = np.abs(core.smooth_weights(core.build_laplacian(points), hard, 0.3) - hard).max(axis=1)
     away = np.linalg.norm(points - [1.0, 0.0, 0.0], axis=1)
-    assert change[away > 0.3].max() < 0.13
+    assert change[away > 0.3].max() < 0.06
     assert change[away > 0.5].max() < 0.015
 
 
