@@ -2,8 +2,9 @@
 
 As many suites run side by side as there are cores, of the machine, a container or by MESHFREE_CORES, while this
 program makes the environments of the next ones; each but the window's in four parts, of every fourth file, so that no
-core waits long for the last. What pytest prints goes to a file per suite in build/tests/, and from there to the screen
-where a test fails.
+core waits long for the last. With --all each part of core's computes by other kernels of OpenBLAS, on one thread or
+two, for no result may hang on how these round. What pytest prints goes to a file per suite in build/tests/, and from
+there to the screen where a test fails.
 """
 
 import argparse
@@ -27,6 +28,8 @@ from core.cores import cores
 RESULTS = ROOT / "build" / "tests"
 MEASURED = "core-3.13"  # environment whose coverage is measured, at almost no cost
 LIMIT = 2700  # seconds for one run of pytest
+KERNELS = ("Haswell", "SkylakeX", "SapphireRapids", "Zen", "Nehalem")  # of OpenBLAS, by its names of processors
+_PRODUCT = "import numpy, scipy.linalg; a = numpy.ones((300, 300)); scipy.linalg.eigh(a @ a)"
 _PARTS = 4  # of the tests of a folder
 _SHOWN = 40  # lines of a run that ended without a word of pytest about what failed
 
@@ -54,11 +57,12 @@ class Suites:
         """Run some tests in an environment as soon as a processor is free; see `isolated`."""
         self._runs.append(self._pool.submit(self._run, name, python, tests, variables))
 
-    def start_folder(self, name, python, folder, *options, **variables):
-        """Run the tests of a folder in parts, by their files, with these options of pytest."""
+    def start_folder(self, name, python, folder, *options, variables=({},)):
+        """Run the tests of a folder in parts, by their files, with these options of pytest; variables take turns."""
         files = sorted(path.relative_to(ROOT) for path in (ROOT / folder).glob("test_*.py"))
         for number in range(_PARTS):
-            self.start(f"{name}-{number + 1}", python, *options, *files[number::_PARTS], **variables)
+            chosen = variables[number % len(variables)]
+            self.start(f"{name}-{number + 1}", python, *options, *files[number::_PARTS], **chosen)
 
     def results(self):
         """Wait for all; return their outcomes by name."""
@@ -70,7 +74,8 @@ class Suites:
         measuring = ["coverage", "run", "-m"] if name.startswith(MEASURED) else []
         command = [str(python), "-m", *measuring, "pytest", *map(str, tests)]
         command += ["-p", "no:cacheprovider", f"--junitxml={report}"]
-        print(f"{name:13} runs, see {log.relative_to(ROOT)}", flush=True)
+        chosen = "".join(f" {key}={value}" for key, value in variables.items())
+        print(f"{name:13} runs, see {log.relative_to(ROOT)}{chosen}", flush=True)
         began = time.monotonic()
         with log.open("wb") as output:
             # In a session of its own, so that Ctrl-C reaches it once: by `_end`.
@@ -133,6 +138,29 @@ def _words(counts, seconds):
     return f"{', '.join(words)} in {seconds:.2f}s"
 
 
+def kernels(python):
+    """Return the kernels that this processor can run, by what the OpenBLAS of numpy or of scipy says in an environment.
+
+    What OpenBLAS does not have it replaces in a word, and what the processor does not have ends the program.
+    """
+    found = []
+    for name in KERNELS:
+        options = {"env": isolated(OPENBLAS_CORETYPE=name, OPENBLAS_VERBOSE="2"), "stdin": subprocess.DEVNULL}
+        told = subprocess.run([python, "-c", _PRODUCT], capture_output=True, text=True, check=False, **options)
+        if told.returncode == 0 and f"Core: {name}" in (told.stdout + told.stderr).splitlines():
+            found.append(name)
+    return found
+
+
+def take_turns(known, first):
+    """Return variables for each part of an environment, the first of whose parts has this number among all parts."""
+    turns = []
+    for number in range(first, first + _PARTS):
+        threads = {"OPENBLAS_NUM_THREADS": "12"[(number + number // _PARTS) % 2]}
+        turns.append({"OPENBLAS_CORETYPE": known[number % len(known)], **threads} if known else threads)
+    return turns
+
+
 def tell_coverage(python):
     """Print how much of core the tests have run."""
     command = [python, "-m", "coverage"]
@@ -169,10 +197,9 @@ def main():
     found = [] if options.gui else list(pythons.find().items())[: None if options.all else 1]
     with Suites() as suites:
         of_core = {f"core-{version}": ensure(f"core-{version}", "test", python) for version, python in found}
-        # Results must not depend on the number of threads: the last one has as many as in Blender.
-        threads = {name: {"OPENBLAS_NUM_THREADS": None} for name in list(of_core)[-1:] if options.all}
-        for name, python in of_core.items():
-            suites.start_folder(name, python, "tests/core", **threads.get(name, {}))
+        for number, (name, python) in enumerate(of_core.items()):
+            turns = take_turns(kernels(python), number * _PARTS) if options.all else ({},)
+            suites.start_folder(name, python, "tests/core", variables=turns)
         for version, python in found:
             suites.start(f"wheel-{version}", ensure(f"wheel-{version}", "wheel", python), "tests/wheel")
         package.build([package.this_platform()])
