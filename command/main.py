@@ -11,13 +11,17 @@ from .inputs import add_files, find_inputs, output_path, outputs_of, read_files
 from .records import Records, add_report, check_report
 from .verbs import make_verbs
 
-DONE, FAILED, WRONG_USAGE, ELSEWHERE = 0, 1, 2, 3  # exit codes
+DONE, FAILED, WRONG_USAGE, ELSEWHERE, STOPPED = 0, 1, 2, 3, 130  # exit codes
 _SCARCE = {errno.ENOMEM, errno.ENOSPC, errno.EDQUOT}  # of errors that another machine may not have
 
 
 def main() -> int:
-    """Run the program `meshfree`, which needs no Blender."""
-    return run(sys.argv[1:], make_verbs(), "meshfree")
+    """Run the program `meshfree`, which needs no Blender; stopped by Ctrl-C it says so, and the exit code is 130."""
+    try:
+        return run(sys.argv[1:], make_verbs(), "meshfree")
+    except KeyboardInterrupt:
+        print("Stopped", file=sys.stderr)
+        return STOPPED
 
 
 def run(argv, verbs, program) -> int:

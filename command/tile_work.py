@@ -2,6 +2,7 @@
 
 import contextlib
 import re
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -25,6 +26,14 @@ DASK = {
     "distributed.admin.tick.interval": "1s",
     "distributed.admin.system-monitor.interval": "5s",
 }
+_LOCAL = {
+    # A worker that ended is waited for: on a busy machine it takes longer than 15 s to come back, those that were given
+    # up then did not, and without any all waited for ever. Where none comes back at all, that is told.
+    "distributed.deploy.lost-worker-timeout": "1 day",
+    "distributed.scheduler.no-workers-timeout": "5 minutes",
+}
+_CLOSING = 60  # seconds
+_IGNORE_STOP = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"  # this process ends its workers itself
 _PACKAGE = "meshfree-laplacian[scale]"
 
 
@@ -213,33 +222,45 @@ def workers(count, address):
     try:
         import dask
         from distributed import Client, KilledWorker, LocalCluster, as_completed
+        from distributed.scheduler import NoWorkerError
     except ImportError as error:
         raise core.PointCloudError(
             f"Several workers need Dask, and {error.name} is missing. Install {_PACKAGE}, or use one worker."
         ) from error
     with contextlib.ExitStack() as stack:
         if not address:
-            stack.enter_context(dask.config.set({**DASK, _SPAWNED: dask.config.get(_SPAWNED) | DASK[_SPAWNED]}))
-            cluster = LocalCluster(
+            spawned = {_SPAWNED: dask.config.get(_SPAWNED) | DASK[_SPAWNED]}
+            stack.enter_context(dask.config.set({**DASK, **_LOCAL, **spawned}))
+            address = LocalCluster(
                 n_workers=count,
                 threads_per_worker=1,
-                dashboard_address=None,
+                dashboard_address="127.0.0.1:0",
                 env={"MESHFREE_CORES": str(core.tiles.cores_of_worker(count))},
+                preload=[_IGNORE_STOP],
             )
-            address = stack.enter_context(cluster)
+            stack.callback(_close, address)
         client = stack.enter_context(Client(address))
 
         def spread(function, many):
             futures = client.map(function, *zip(*many, strict=True), pure=False) if many else []
             try:
                 yield from (done.result() for done in as_completed(futures))
-            except KilledWorker as error:
+            except (KilledWorker, NoWorkerError) as error:
                 raise core.NotEnoughMemoryError(
-                    "Workers ended one after the other at the same tile, as where the memory is not enough. Go on with"
-                    " fewer workers, or cut into another folder with --tile-points for smaller tiles."
+                    "Workers ended one after the other, as where the memory is not enough. Go on with fewer workers, or"
+                    " cut into another folder with --tile-points for smaller tiles."
                 ) from error
 
         yield spread
+
+
+def _close(cluster):
+    """End the workers of this machine. What they were to do is done by now, or its error is on the way."""
+    cluster.shutdown_on_close = False  # here, and not once more as the program ends
+    try:
+        cluster.close(timeout=_CLOSING)
+    except Exception as error:  # of any sort: Dask may stumble over workers that it is just starting again
+        print(f"Workers are ended with the program, for Dask did not close them: {error!r}", file=sys.stderr)
 
 
 def seconds_of(store, number):

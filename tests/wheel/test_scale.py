@@ -89,6 +89,79 @@ with tile_work.workers(2, "") as spread:
     assert "--tile-points" in call(sys.executable, "-c", code, env={"PYTHONPATH": str(site(place))})
 
 
+def ending(place, before):
+    """Run a task that ends its worker, after some other lines, and return what is printed."""
+    code = f"""
+import os
+from meshfree_laplacian.command import tile_work
+{before}
+with tile_work.workers(2, "") as spread:
+    try:
+        list(spread(os._exit, [(1,)]))
+    except tile_work.core.NotEnoughMemoryError as error:
+        print(error)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "PYTHONPATH": str(site(place))},
+        capture_output=True,
+        text=True,
+        timeout=250,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    return done.stdout, done.stderr
+
+
+def test_workers_that_do_not_come_back_are_told(place):
+    # Given up as soon as they end, as they are by default where they take longer than 15 s to come back.
+    soon = {"distributed.deploy.lost-worker-timeout": "50ms", "distributed.scheduler.no-workers-timeout": "3s"}
+    told, _ = ending(place, f"tile_work._LOCAL.update({soon})")
+    assert "--tile-points" in told
+
+
+def test_workers_that_dask_does_not_close_are_told_and_change_nothing(place):
+    told, besides = ending(
+        place,
+        """
+import distributed
+async def fail(self):
+    raise AssertionError("starting")
+distributed.LocalCluster._close = fail
+""",
+    )
+    assert "--tile-points" in told
+    assert "did not close them: AssertionError('starting')" in besides
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no Ctrl-C for one program there")
+def test_ctrl_c_stops_all_workers_in_a_word(place, folder):
+    # A shell that runs programs in the background lets them ignore Ctrl-C.
+    listens = f"import signal; signal.signal(signal.SIGINT, signal.default_int_handler); {CODE}"
+    python, option, _, *arguments = command("stopped", 2)
+    running = subprocess.Popen(
+        [python, option, listens, *arguments],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(site(place)), "OPENBLAS_NUM_THREADS": "1"},
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        while not (folder / "stopped" / "store" / KILLED_AFTER).exists():
+            assert running.poll() is None
+            time.sleep(0.02)
+        workers = psutil.Process(running.pid).children(recursive=True)
+        os.killpg(running.pid, signal.SIGINT)  # as a terminal sends it, to all of the program's processes
+        _, besides = running.communicate(timeout=100)
+    finally:
+        running.kill()
+    assert running.returncode == 130
+    assert besides.endswith("Stopped\n")
+    assert "Traceback" not in besides
+    assert not psutil.wait_procs(workers, timeout=10)[1]
+
+
 def test_the_manual_has_the_settings_of_dask(place):
     code = "import json; from meshfree_laplacian.command.tile_work import DASK; print(json.dumps(DASK))"
     settings = json.loads(call(sys.executable, "-c", code, env={"PYTHONPATH": str(site(place))}))
