@@ -1,6 +1,7 @@
 """Clouds larger than memory: what is read of their files, who works on their tiles, and what is written of each."""
 
 import contextlib
+import logging
 import re
 import sys
 from pathlib import Path
@@ -32,6 +33,7 @@ _LOCAL = {
     "distributed.deploy.lost-worker-timeout": "1 day",
     "distributed.scheduler.no-workers-timeout": "5 minutes",
 }
+_QUIET = {"DASK_LOGGING__DISTRIBUTED": "critical"}  # what workers meet while they are ended is no one's concern
 _CLOSING = 60  # seconds
 _IGNORE_STOP = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"  # this process ends its workers itself
 _PACKAGE = "meshfree-laplacian[scale]"
@@ -229,7 +231,8 @@ def workers(count, address):
         ) from error
     with contextlib.ExitStack() as stack:
         if not address:
-            spawned = {_SPAWNED: dask.config.get(_SPAWNED) | DASK[_SPAWNED]}
+            spawned = {_SPAWNED: dask.config.get(_SPAWNED) | DASK[_SPAWNED] | _QUIET}
+            logging.getLogger("distributed").setLevel(logging.CRITICAL)
             stack.enter_context(dask.config.set({**DASK, **_LOCAL, **spawned}))
             address = LocalCluster(
                 n_workers=count,
@@ -237,8 +240,9 @@ def workers(count, address):
                 dashboard_address="127.0.0.1:0",
                 env={"MESHFREE_CORES": str(core.tiles.cores_of_worker(count))},
                 preload=[_IGNORE_STOP],
+                silence_logs=logging.CRITICAL,
             )
-            stack.callback(_close, address)
+            stack.callback(_close, address, count)
         client = stack.enter_context(Client(address))
 
         def spread(function, many):
@@ -254,8 +258,10 @@ def workers(count, address):
         yield spread
 
 
-def _close(cluster):
+def _close(cluster, count):
     """End the workers of this machine. What they were to do is done by now, or its error is on the way."""
+    with contextlib.suppress(TimeoutError):
+        cluster.wait_for_workers(count, timeout=_CLOSING)  # one that is just starting again would stumble
     cluster.shutdown_on_close = False  # here, and not once more as the program ends
     try:
         cluster.close(timeout=_CLOSING)

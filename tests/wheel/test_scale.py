@@ -76,21 +76,8 @@ def test_a_killed_worker_changes_nothing(place, folder):
     assert not list(store.rglob("state-*"))
 
 
-def test_workers_that_end_one_after_the_other_are_told(place):
-    code = """
-import os
-from meshfree_laplacian.command import tile_work
-with tile_work.workers(2, "") as spread:
-    try:
-        list(spread(os._exit, [(1,)]))
-    except tile_work.core.NotEnoughMemoryError as error:
-        print(error)
-"""
-    assert "--tile-points" in call(sys.executable, "-c", code, env={"PYTHONPATH": str(site(place))})
-
-
-def ending(place, before):
-    """Run a task that ends its worker, after some other lines, and return what is printed."""
+def ending(place, before=""):
+    """Run a task that ends its workers, after some other lines, and return what is printed."""
     code = f"""
 import os
 from meshfree_laplacian.command import tile_work
@@ -109,15 +96,21 @@ with tile_work.workers(2, "") as spread:
         timeout=250,
     )
     assert done.returncode == 0, done.stderr
-    assert "Traceback" not in done.stderr
     return done.stdout, done.stderr
+
+
+def test_workers_that_end_one_after_the_other_are_told(place):
+    told, besides = ending(place)
+    assert "--tile-points" in told
+    assert "Traceback" not in besides
 
 
 def test_workers_that_do_not_come_back_are_told(place):
     # Given up as soon as they end, as they are by default where they take longer than 15 s to come back.
     soon = {"distributed.deploy.lost-worker-timeout": "50ms", "distributed.scheduler.no-workers-timeout": "3s"}
-    told, _ = ending(place, f"tile_work._LOCAL.update({soon})")
+    told, besides = ending(place, f"tile_work._LOCAL.update({soon}); tile_work._CLOSING = 5")
     assert "--tile-points" in told
+    assert "Traceback" not in besides
 
 
 def test_workers_that_dask_does_not_close_are_told_and_change_nothing(place):
