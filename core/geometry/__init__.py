@@ -42,13 +42,13 @@ from .nearest import (
 from .noise import FILLING, near_misfit
 from .normals import near_edges, side_sums, signs_by_sums, unit_normals
 from .orientation import orient_normals, toward
-from .pairs import Pairs, find_pairs
+from .pairs import Pairs
 from .patches import Patch
 from .points import FEWEST, ScaledPoints, as_indices, as_mask, check_points, check_values, scale_points
 from .prolongation import Prolongation, balanced_weights
 from .quadrics import CURVED, MANY, check_surface, count_curves, frames, roundness
 from .rows import look_across_rows
-from .sheets import choose_bridges, join_touching, same_sheet, sheet_neighbors
+from .sheets import choose_bridges, join_touching, sheet_neighbors
 from .strays import PARTS, label_parts, stray_scores, without
 from .subset import FINEST, blue_noise_subset, independent, mix_bits
 from .thinning import nearest_in_blocks, thin

@@ -130,7 +130,6 @@ BELOW = {  # what each wing of core may use
 }
 SIDEWAYS = {  # packages and modules of applications that build on others
     ("deforming", "graph"),
-    ("distance", "graph"),
     ("fields", "graph"),
     ("measuring", "deforming"),
     ("measuring", "distance"),

@@ -96,7 +96,9 @@ class TestSignedDistance:
         reports = []
         geodesics = core.Geodesics(square)
         geodesics.signed_distance([0, 800, 1600], progress=lambda stage, fraction: reports.append((stage, fraction)))
-        assert [stage for stage, _ in reports] == ["Curve", "Curve", "Distance"]
+        stages = [stage for stage, _ in reports]
+        assert stages[:3] == ["Curve", "Curve", "Distance"]
+        assert set(stages[3:]) <= {"Distance"}
         assert reports == sorted(reports, key=lambda report: report[1])
 
     def test_inside_and_outside_of_sharp_corners(self, square):

@@ -232,7 +232,7 @@ class TestLogarithmicMap:
     def test_stages_are_reported(self):
         laplacian, reports = core.build_laplacian(random_sphere(600)), []
         core.logarithmic_map(laplacian, 7, progress=lambda stage, fraction: reports.append(stage))
-        assert {"Equations", "Factors", "Directions", "Lengths", "Distance", "Map"} == set(reports)
+        assert {"Equations", "Factors", "Directions", "Lengths", "Distance"} == set(reports)
 
     def test_wrong_source(self, square):
         with pytest.raises(core.InvalidPointsError, match="whole numbers below"):

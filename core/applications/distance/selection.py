@@ -2,18 +2,15 @@
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse.csgraph import dijkstra
 
 from ...arguments import as_doubles, check_array, real
 from ...errors import PointCloudError
 from ...geometry import as_mask
 from ...operator import LaplaceBeltrami
 from ...types import Bools, Floats, Ints
-from ..graph import near_graph
 from .geodesics import Geodesics
 
 _OBLIQUE = 3.0  # slope to the ray of a surface whose points are distinguished from those behind it: 72 degrees
-_NEIGHBORS = 20  # so many directions make paths at most 2 % longer than geodesics
 
 
 def grow(laplacian: LaplaceBeltrami, chosen: ArrayLike, distance: float) -> Bools:
@@ -173,10 +170,11 @@ def opposite_ends(laplacian: LaplaceBeltrami, share: float = 0.03) -> tuple[Ints
     component, areas = laplacian.component, laplacian.areas
     known = component >= 0
     largest = np.flatnonzero(component == np.bincount(component[known], weights=areas[known]).argmax())
-    graph = near_graph(laplacian, _NEIGHBORS)
+    geodesics = Geodesics(laplacian)
 
     def lengths(start: int) -> Floats:
-        return dijkstra(graph.lengths, directed=False, indices=graph.place[start])[graph.place[largest]]
+        found = geodesics.distance([start])[largest]
+        return np.where(np.isfinite(found), found, 0.0)  # no end where no path leads
 
     offset = laplacian.points[largest] - laplacian.points[largest].mean(axis=0)
     one = lengths(largest[np.einsum("ij,ij->i", offset, offset).argmax()]).argmax()

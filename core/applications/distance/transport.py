@@ -1,21 +1,18 @@
 """Parallel transport of directions along the surface, and maps of it around a point."""
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...algebra import TwoGrid, blocks, on_all_cores
+from ...algebra import TwoGrid
 from ...arguments import as_array, as_doubles, check_array, check_finite
 from ...errors import InvalidPointsError
 from ...geometry import as_indices
 from ...operator import LaplaceBeltrami, connection_laplacian, tangent_frames
-from ...types import Array, Floats, Progress
+from ...types import Floats, Progress
 from .geodesics import Geodesics
 
 _TIME = 3.0  # smoothing lengths that heat spreads over: fewer do not average out the randomness of points
 _FARTHEST = 200.0  # extent of the object in such lengths, at most, or the heat there underflows
-_BLOCK = 1 << 16  # pairs worked on at one time, so that they stay in the cache
 
 
 def transport(
@@ -211,16 +208,9 @@ class Transport:
         if geodesics is None:
             geodesics = self._geodesics = self._geodesics or Geodesics(laplacian, progress=progress)
         distance = geodesics.distance([source], progress=progress)
-        reached = np.isfinite(distance)
-        report = progress or _silent
-        outwards = _gradient(laplacian, frames, np.where(reached, distance, 0.0), lambda: report("Map", 0.9))
-        angle = np.angle(outwards * np.einsum("ij,ij->i", axis, frames).conj())
-        # The distance has no gradient at the point itself: around it, directions are those in the tangent plane.
-        near = laplacian.stiffness[[source]].tocoo().col
-        offset = (laplacian.surface_points[near] - laplacian.surface_points[source]) @ frames[source]
-        angle[near] = np.angle(offset * (axis[source] @ frames[source]).conj())
-        position = np.where(reached, distance, np.nan) * np.exp(1j * angle)
-        return np.column_stack([position.real, position.imag])
+        outward = geodesics.outward(distance) * np.einsum("ij,ij->i", axis, frames).conj()
+        position = np.where(np.isfinite(distance), distance, np.nan) * np.exp(1j * np.angle(outward))
+        return np.column_stack([position.real, position.imag]) + 0.0  # not -0
 
 
 def logarithmic_map(
@@ -261,8 +251,7 @@ def logarithmic_map(
     Notes
     -----
     The initial direction of a geodesic is the angle, at its end, between the gradient of the distance and a direction
-    transported there from the center, as in the Vector Heat Method; distances are those of `geodesic_distance`. On
-    regular grids, where shortest paths follow the directions of the grid, errors of directions are up to a few degrees.
+    transported there from the center, as in the Vector Heat Method; distances are those of `geodesic_distance`.
 
     Examples
     --------
@@ -276,32 +265,6 @@ def logarithmic_map(
     [0. 0.] 3.1
     """
     return Transport(laplacian, progress=progress).logarithmic_map(source, direction, progress=progress)
-
-
-def _gradient(laplacian: LaplaceBeltrami, frames: Array, values: Floats, report: Callable[[], None]) -> Array:
-    """Return the gradient of a function, (n,) complex in the frames, by least squares over all pairs."""
-    stiffness = laplacian.stiffness
-    places, axes = np.ascontiguousarray(laplacian.surface_points.T), np.ascontiguousarray(frames.T)
-    result = np.empty(len(values), dtype=complex)
-
-    def fit(rows: slice) -> None:
-        start = stiffness.indptr[rows.start : rows.stop + 1]
-        second, weight = stiffness.indices[start[0] : start[-1]], -stiffness.data[start[0] : start[-1]]
-        own = np.repeat(np.arange(len(start) - 1), np.diff(start))  # a pair of a point with itself has no length
-        offset = places.take(second, axis=1) - places[:, rows].take(own, axis=1)
-        u, v = (np.einsum("ak,ak->k", offset, axis[:, rows].take(own, axis=1)) for axis in (axes.real, axes.imag))
-        rise = values[second] - values[rows][own]
-
-        def total(left: Floats, right: Floats) -> Array:
-            return np.bincount(own, weight * left * right, minlength=len(start) - 1)
-
-        xx, xy, yy, x, y = total(u, u), total(u, v), total(v, v), total(rise, u), total(rise, v)
-        determinant = xx * yy - xy**2
-        result[rows] = (yy * x - xy * y + 1j * (xx * y - xy * x)) / np.where(determinant > 0.0, determinant, 1.0)
-
-    size = max(1, _BLOCK * len(values) // max(1, stiffness.nnz))
-    on_all_cores(fit, blocks(len(values), size), report)
-    return result
 
 
 def _silent(stage: str, fraction: float) -> None:
