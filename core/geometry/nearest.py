@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from ..cores import cores
 from ..types import Bools, Floats, Ints
-from .quadrics import Quadrics, fit_quadrics
+from .quadrics import Quadrics, fit_quadrics, roundness
 
 COUNT = 41  # the point itself and 40 others, so that a component has an operator if its neighbourhoods lie within it
 NEXT = 8  # nearest of them: as many as there are directions in which a sheet or a row goes on
@@ -23,6 +23,7 @@ POWER = 8  # of a mean that its greatest values decide
 ON = 0.3  # spacings from a surface within which a point lies on it
 SMOOTH = 0.7  # cosine between normals of one smooth sheet, or between directions across one boundary, at least
 GAP = 2.5  # times the usual that a gap may be wide, as in rows 25 times denser along than across: else it is a hole
+ROW = 0.2  # roundness of the nearest points of a row: ten times denser along than across, and of the nearest eight
 _MEASURED = 100_000  # points whose neighbours are searched for in a tenth of a second
 
 
@@ -82,6 +83,13 @@ class Nearest:
         """
         few = np.count_nonzero(kept & (self.weight > 0.0), axis=1) < FEW
         return replace(self, weight=np.where(kept | few[:, None], self.weight, 0.0))
+
+    def along_row(self, rows: Ints) -> Bools:
+        """Tell of which of some points, (k,) int, the nearest eight neighbours lie along a row, (k,) bool."""
+        offset = self.points[self.index[rows, : NEXT + 1]]
+        offset = offset - offset.mean(axis=1, keepdims=True)
+        lined: Bools = roundness(np.linalg.eigvalsh(np.swapaxes(offset, 1, 2) @ offset)) < ROW
+        return lined
 
     def across(self, component: Ints) -> Bools:
         """Tell which points have neighbours of another component than their own, (m,) bool, by those, (m,) int."""

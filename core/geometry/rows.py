@@ -7,10 +7,9 @@ import numpy as np
 from ..algebra import blocks, on_all_cores
 from ..types import Bools, Floats, Ints
 from .components import label_connected
-from .nearest import NEXT, Nearest, fading_weights
-from .quadrics import fit_quadrics, roundness
+from .nearest import NEXT, ROW, Nearest, fading_weights
+from .quadrics import fit_quadrics
 
-_ROW = 0.2  # roundness of the nearest points of a row: ten times denser along than across, and of the nearest eight
 _WIDER = 16  # times the 40 neighbours are looked at: the next row may be a hundred times as far as the next point
 _BLOCK = 1 << 11  # points looked at at one time
 
@@ -33,8 +32,8 @@ def look_across_rows(nearest: Nearest) -> Nearest:
     """
     if nearest.index.shape[1] <= NEXT:
         return nearest
-    rows = np.flatnonzero((nearest.quadrics.roundness < _ROW) & ~nearest.in_row)
-    rows = rows[_round(nearest, rows) < _ROW]
+    rows = np.flatnonzero((nearest.quadrics.roundness < ROW) & ~nearest.in_row)
+    rows = rows[nearest.along_row(rows)]
     if not len(rows):
         return nearest
     in_row = nearest.in_row.copy()
@@ -70,13 +69,6 @@ def look_across_rows(nearest: Nearest) -> Nearest:
     in_row[back] = False
     result = replace(nearest, index=index, distance=distance, weight=weight, in_row=in_row)
     return result.with_quadrics(nearest.quadrics.put(found[rounder], fitted.take(np.flatnonzero(rounder))))
-
-
-def _round(nearest: Nearest, rows: Ints) -> Floats:
-    """Return how round the nearest eight neighbours of some points lie, (k,)."""
-    offset = nearest.points[nearest.index[rows, : NEXT + 1]]
-    offset = offset - offset.mean(axis=1, keepdims=True)
-    return roundness(np.linalg.eigvalsh(np.swapaxes(offset, 1, 2) @ offset))
 
 
 def _label_rows(nearest: Nearest, in_row: Bools) -> Ints:

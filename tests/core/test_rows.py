@@ -49,6 +49,20 @@ def test_a_surface_in_rows_is_measured(cloud, at_boundary):
     assert np.count_nonzero(laplacian.boundary) == at_boundary
 
 
+@pytest.mark.parametrize("across", [7, 8, 9, 9.7, 10])
+def test_closed_rings_are_one_surface(across):
+    """A cylinder whose rings are that many times as far apart as their points: no edge is a gap at their ends."""
+    angle, height = (
+        part.ravel()
+        for part in np.meshgrid(np.arange(int(24 * across)) * 2.0 * np.pi / int(24 * across), np.arange(9) * np.pi / 12)
+    )
+    laplacian = core.build_laplacian(np.column_stack([np.cos(angle), np.sin(angle), height]))
+    assert np.all(laplacian.component == 0)
+    turn = np.minimum(angle, 2.0 * np.pi - angle)
+    exact = np.hypot(turn, height - height[0])
+    np.testing.assert_allclose(core.geodesic_distance(laplacian, [0]), exact, rtol=1e-2, atol=1e-2)
+
+
 def test_eigenvalues_of_a_rectangle_in_rows():
     # They are twenty times as far apart as their points, and leave the last gap of the unit square out.
     points = grid_points(np.arange(600) / 600.0, np.arange(30) / 30.0, [0.0])
