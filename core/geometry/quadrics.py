@@ -13,6 +13,8 @@ _CURVE = 5e-3  # roundness of neighbours on a curve
 MANY = 0.1  # share of the points: fewer are a few places, and not the whole scan
 CURVED = 0.3  # share by which curvature may change a length, an area or a weight at most, where the fit is poor
 _FADING = 0.84  # scatter of fits with weights that fade, over that with the same number of equal ones
+_LOOSE = 15.0  # bend over noise, in units of the neighborhood: up to 7 at edges, 18 and more through two even rows
+_FORM = np.array([1.0, 0.5, 1.0])  # weights of the squares of u^2, u v and v^2: the same whatever way u and v point
 _RIDGE = 1e-10  # keeps the normal equations solvable where the neighbours lie on a conic
 
 
@@ -65,6 +67,9 @@ def fit_quadrics(
     points: Floats, index: Ints, weight: Floats, rows: Ints | None = None, normals: Floats | None = None
 ) -> Quadrics:
     """Fit ``z = c0 + c1 u + c2 v + c3 u^2 + c4 u v + c5 v^2`` around points.
+
+    Neighbours that lie in two rows, as at the edge of scan lines, leave the slope across free: of all quadrics that fit
+    them, the least bent one counts there.
 
     Parameters
     ----------
@@ -119,7 +124,11 @@ def fit_quadrics(
                 equations[row, column] = equations[column, row] = _sums(weighted, basis[column])
         equations[range(6), range(6)] += _RIDGE
         solved = eliminate(equations)
-        fit = solved[:, 6].T
+        bend = solved[:, 3] + solved[:, 5]  # of the inverse: with its own variance for noise of equal weight
+        scatter = _FADING * np.sqrt((bend[3] + bend[5]) * _sums(share, share))
+        fitted.scatter[block] = scatter / unit**2
+        least = (bend * solved[:, 6])[3:].T @ _FORM / ((bend**2)[3:].T @ _FORM)
+        fit = (solved[:, 6] - np.where(scatter > _LOOSE, least, 0.0) * bend).T
         missed = z - sum(values * part[:, None] for values, part in zip(basis, fit.T, strict=True))
         slope = 1.0 + fit[:, 1] ** 2 + fit[:, 2] ** 2
         local = np.stack([np.ones_like(slope), -fit[:, 2], -fit[:, 1]], axis=1) / np.sqrt(slope)[:, None]
@@ -132,8 +141,6 @@ def fit_quadrics(
         fitted.shape_operator[block] = (tangents @ form @ np.swapaxes(tangents, 1, 2)) / unit[:, None, None]
         fitted.height[block] = (fit[:, 0] * unit)[:, None] * frame[:, :, 0]
         fitted.misfit[block] = np.sqrt(_sums(share * missed, missed)) * unit
-        bent = solved[3, 3] + 2.0 * solved[3, 5] + solved[5, 5]  # of the inverse: variance for noise of equal weight
-        fitted.scatter[block] = _FADING * np.sqrt(bent * _sums(share, share)) / unit**2
 
     on_all_cores(fit_block, blocks(count, _BLOCK))
     return fitted

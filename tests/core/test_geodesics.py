@@ -57,10 +57,11 @@ def scan_lines(across, jitter, along=None, lines=16, seed=0):
     return points, {"corner": 0, "side": along // 2 * lines, "end": lines // 2, "inside": (along // 2) * lines + 7}
 
 
-@pytest.mark.parametrize("jitter", [0.0, 0.1])
+@pytest.mark.parametrize(("jitter", "noise"), [(0.0, 0.0), (0.1, 0.0), (0.0, 0.05)])
 @pytest.mark.parametrize("across", [1, 3, 5, 8, 12])
-def test_scan_lines(across, jitter):
+def test_scan_lines(across, jitter, noise):
     points, sources = scan_lines(across, jitter)
+    points[:, 2] = noise * np.random.default_rng(2).normal(size=len(points))
     points = points @ np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0] + [3e5, 5e6, 200.0]
     laplacian = core.build_laplacian(points)
     geodesics, carried = core.Geodesics(laplacian), core.Transport(laplacian)

@@ -63,6 +63,22 @@ def test_closed_rings_are_one_surface(across):
     np.testing.assert_allclose(core.geodesic_distance(laplacian, [0]), exact, rtol=1e-2, atol=1e-2)
 
 
+@pytest.mark.parametrize("radius", [np.inf, 40.0])
+@pytest.mark.parametrize("across", [6, 8, 9, 12])
+def test_normals_where_only_two_rows_are_near(across, radius):
+    """Any slope across fits the last two of some rows, of a plane or bent along them: the least bent quadric counts."""
+    along, row = (part.ravel() for part in np.meshgrid(np.arange(120.0), np.arange(12), indexing="ij"))
+    noise = 0.05 * np.random.default_rng(0).normal(size=len(along))
+    points, exact = np.column_stack([along, across * row, noise]), np.tile([0.0, 0.0, 1.0], (len(along), 1))
+    if np.isfinite(radius):
+        exact = np.column_stack([np.cos(along / radius), np.zeros(len(along)), np.sin(along / radius)])
+        points = (radius + noise)[:, None] * exact + across * row[:, None] * [0.0, 1.0, 0.0]
+    normals = core.build_laplacian(points).normals
+    angle = np.degrees(np.arccos(np.minimum(np.abs(np.einsum("ij,ij->i", normals, exact)), 1.0)))
+    assert angle.max() < 5.0
+    assert angle[(row == 0) | (row == 11)].mean() < 1.0
+
+
 def test_eigenvalues_of_a_rectangle_in_rows():
     # They are twenty times as far apart as their points, and leave the last gap of the unit square out.
     points = grid_points(np.arange(600) / 600.0, np.arange(30) / 30.0, [0.0])
