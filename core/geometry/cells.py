@@ -10,7 +10,7 @@ import numpy as np
 from ..algebra import blocks, on_all_cores
 from ..cores import cores
 from ..types import Bools, Floats, Ints, Report
-from .distances import arc_squared, bent_squared
+from .distances import arc_squared, bent_ways
 from .nearest import COUNT, Nearest
 from .quadrics import CURVED, frames
 from .sheets import on_sheet
@@ -137,22 +137,21 @@ def _cuts(
         joined = component[index] == component[rows, None]
         counted &= joined
     index, distance, counted, joined = index[:, 1:], distance[:, 1:], counted[:, 1:], joined[:, 1:]
-    frame = frames(normals[rows])[:, :, 1:]
+    around = normals if sides is None else sides.around
+    side = np.where(np.einsum("ikc,ic->ik", around[index], around[rows]) < 0.0, -1.0, 1.0)
+    here, there = normals[rows], side[:, :, None] * normals[index]
+    frame = frames(here)[:, :, 1:]
     chord = nearest.points[index] - nearest.points[rows, None]
-    own, other = normals[rows], normals[index]
-    cosine = np.einsum("ikc,ic->ik", other, own)
-    other = np.where(cosine < 0.0, -1.0, 1.0)[:, :, None] * other
-    left, right = np.einsum("ikc,ic->ik", chord, own), np.einsum("ikc,ikc->ik", chord, other)
-    squared = arc_squared(distance**2, left, right, np.abs(cosine))
+    cosine = np.einsum("ikc,ic->ik", there, here)
+    left, right = np.einsum("ikc,ic->ik", chord, here), np.einsum("ikc,ikc->ik", chord, there)
+    squared, ahead = arc_squared(distance**2, left, right, cosine), (right - left) / 6.0
     if sides is not None:
         sure = np.maximum(sides.sharp[rows, None], sides.sharp[index])
         edged = np.nonzero(sure)
-        side = np.where(cosine[edged] < 0.0, -1.0, 1.0)
-        turn = sides.turn(rows[edged[0]], index[edged], chord[edged], side)
-        heights = left[edged], right[edged]
-        squared[edged] = bent_squared(distance[edged] ** 2, *heights, np.abs(cosine[edged]), turn, sure[edged])
-    # The direction of the arc at the point, from its chord and a third of the angle between the normals.
-    step = (chord + ((right - left) / 6.0)[:, :, None] * other) @ frame
+        turn = sides.turn(rows[edged[0]], index[edged], chord[edged], side[edged])
+        heights = left[edged], right[edged], cosine[edged]
+        squared[edged], ahead[edged] = bent_ways(distance[edged] ** 2, *heights, turn, sure[edged])
+    step = (chord + ahead[:, :, None] * there) @ frame
     length = 0.5 * np.sqrt(squared) * (1.0 + np.clip(gaussian_curvature[rows, None] * squared / 12.0, -CURVED, CURVED))
     length = np.maximum(length, _CLOSEST * nearest.spacing[rows, None])
     cuts = step * (counted / (np.maximum(np.linalg.norm(step, axis=2), 1e-300) * length))[:, :, None]

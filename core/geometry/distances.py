@@ -35,26 +35,36 @@ def arc_squared(squared: Floats, left: Floats, right: Floats, cosine: Floats | f
     return squared + (right - left) ** 2 * (1.0 / 12.0 + (1.0 - cosine) / 45.0) + (left + right) ** 2 / 20.0
 
 
-def bent_squared(squared: Floats, left: Floats, right: Floats, cosine: Floats, turn: Floats, sharp: Floats) -> Floats:
-    """Return the squared length of the shortest ways over chords where edges may lie between their ends.
+def bent_ways(
+    squared: Floats, left: Floats, right: Floats, cosine: Floats, turn: Floats, sharp: Floats
+) -> tuple[Floats, Floats]:
+    """Return the squared length of the shortest ways over chords where edges may lie between their ends, and a tilt.
 
-    Over the edge in which two planes meet it has two legs: ``s^2 = r^2 - 2 d e / (1 + cosine)``. What the normals turn
-    by more than the surface bends is taken for an edge, as far as one is sure, and the rest for that of `arc_squared`.
+    Over the edge in which two planes meet it has two legs: ``s^2 = r^2 - 2 d e / (1 + cosine)``. In the plane of the
+    first end its direction is that of the chord with ``-d / (1 + cosine)`` of the second normal added; that of an arc,
+    with ``(e - d) / 6``, as it starts off by a third of the angle between the normals. What the normals turn by more
+    than the surface bends is taken for an edge, as far as one is sure, and the rest for an arc; at a step, where both
+    ends see the other one on the same side, for an arc the more, the more they do.
 
     Parameters
     ----------
     squared, left, right, cosine : ndarray
-        As of `arc_squared`; the cosine is not negative.
+        As of `arc_squared`. Folds sharper than the normals of one sheet turn count as those.
     turn : ndarray
         What e - d would be by the curvatures at both ends.
     sharp : ndarray
         From 0 to 1, how sure an edge is.
+
+    Returns
+    -------
+    squared, ahead : ndarray
     """
-    arc = arc_squared(squared, left, right, cosine)
     change = right - left
     share = sharp * np.clip(1.0 - turn / np.where(change == 0.0, 1.0, change), 0.0, 1.0)
-    legs = squared - 2.0 * left * right / (1.0 + cosine)
-    return np.where(left * right < 0.0, arc + share * (legs - arc), arc)
+    share *= np.minimum(change**2 / np.maximum(left**2 + right**2, 1e-300), 1.0)
+    open_ = np.maximum(1.0 + cosine, 1.0 - SMOOTH)
+    legs, arc = squared - 2.0 * np.minimum(left * right, 0.0) / open_, arc_squared(squared, left, right, cosine)
+    return arc + share * (legs - arc), change / 6.0 - share * (left / open_ + change / 6.0)
 
 
 def circle_arc(chord: Floats, sine: Floats) -> Floats:
@@ -65,15 +75,15 @@ def circle_arc(chord: Floats, sine: Floats) -> Floats:
 def arc_length(cloud: Cloud) -> Floats:
     """Return the length of the arc that joins each pair within the surface.
 
-    That of `arc_squared`, or of `bent_squared` where an edge is near, and ``g max(r^2 - a^2, 0)`` more: the path up and
+    That of `arc_squared`, or of `bent_ways` where an edge is near, and ``g max(r^2 - a^2, 0)`` more: the path up and
     down over a roughness finer than the normals resolve, of mean squared slope g, the mean of both ends. Between points
     one spacing a apart the chord is that path.
 
     Parameters
     ----------
     cloud : Cloud
-        Of m points, with p pairs. The second normal is flipped to the first one's side, pair by pair: signs do not
-        matter.
+        Of m points, with p pairs. The second normal is flipped to the first one's side, pair by pair, by the normals of
+        all neighbours: signs do not matter.
 
     Returns
     -------
@@ -82,12 +92,12 @@ def arc_length(cloud: Cloud) -> Floats:
     pairs, steep = cloud.pairs, cloud.squared_slope.any()
     result = np.empty(len(pairs.first))
     points, normals = pairs.points.T.copy(), cloud.sides.normals.T.copy()
-    sharp = cloud.sides.sharp
+    around, sharp = cloud.sides.around.T.copy(), cloud.sides.sharp
 
     def measure(patch: Patch) -> None:
         chord, left, right, cosine = pair_heights(patch.first, patch.second, points, normals)
-        side = np.where(cosine < 0.0, -1.0, 1.0)
-        right, cosine = side * right, np.abs(cosine)
+        side = np.where(dots(patch.first(around), patch.second(around)) < 0.0, -1.0, 1.0)
+        right, cosine = side * right, side * cosine
         squared = pairs.distance[patch.pairs] ** 2
         arc = arc_squared(squared, left, right, cosine)
         sure = np.maximum(patch.first(sharp), patch.second(sharp))
@@ -95,7 +105,7 @@ def arc_length(cloud: Cloud) -> Floats:
         if len(edged):
             first, second = (ends[patch.pairs][edged] for ends in (pairs.first, pairs.second))
             turn = cloud.sides.turn(first, second, chord[:, edged].T, side[edged])
-            arc[edged] = bent_squared(squared[edged], left[edged], right[edged], cosine[edged], turn, sure[edged])
+            arc[edged] = bent_ways(squared[edged], left[edged], right[edged], cosine[edged], turn, sure[edged])[0]
         if steep:
             arc += patch.mean(cloud.squared_slope) * np.maximum(squared - patch.mean(cloud.spacing) ** 2, 0.0)
         result[patch.pairs] = np.sqrt(arc)

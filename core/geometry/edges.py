@@ -11,9 +11,9 @@ from ..types import Floats, Ints
 from .moments import MET
 from .nearest import POWER, SMOOTH, Nearest
 from .noise import LEFT
-from .quadrics import Quadrics, fit_quadrics
+from .quadrics import Quadrics, fit_quadrics, heights_over
 
-_ROUNDS = 20  # of fits, each by the normals of the last; nearly all points need fewer
+_ROUNDS = 8  # of fits, each by the normals of the last; nearly all points need fewer
 _COEFFICIENTS = 6  # of a quadric
 _BLOCK = 1 << 12  # points fitted at one time
 
@@ -30,11 +30,15 @@ class Sides:
         As of `Quadrics`.
     sharp : ndarray, (m,)
         How sure it is that an edge is near, from 0 to 1. At zero, normal and bend are those of the quadric.
+    around : ndarray, (m, 3)
+        Unit normals of the quadrics through all neighbours, towards the same side of the surface: across an edge, too,
+        they tell whether two points see the same one.
     """
 
     normals: Floats
     shape_operator: Floats
     sharp: Floats
+    around: Floats
 
     def turn(self, first: Ints, second: Ints, chord: Floats, side: Floats) -> Floats:
         """Return by how much normals differ along chords, (k, 3), by the bends at both ends: what is no edge.
@@ -48,20 +52,21 @@ class Sides:
     def toward(self, normals: Floats) -> Sides:
         """Return the same, seen from where normals of the surface, (m, 3), point."""
         side = np.where(np.einsum("ij,ij->i", normals, self.normals) < 0.0, -1.0, 1.0)
-        return Sides(side[:, None] * self.normals, side[:, None, None] * self.shape_operator, self.sharp)
+        return Sides(side[:, None] * self.normals, side[:, None, None] * self.shape_operator, self.sharp, normals)
 
 
 def one_side(quadrics: Quadrics, normals: Floats) -> Sides:
     """Return the sides of a surface without edges, by its normals, (m, 3)."""
-    return Sides(normals, quadrics.shape_operator, np.zeros(len(normals)))
+    return Sides(normals, quadrics.shape_operator, np.zeros(len(normals)), normals)
 
 
 def find_sides(nearest: Nearest, quadrics: Quadrics) -> Sides:
     """Fit quadrics again where they miss their neighbours, to those whose normals agree, until normals turn no more.
 
     Across an edge normals differ more and more with each such fit, on each side they agree; where the surface is round
-    or noisy the fit stays much the same. How sure an edge is follows from what is left of the misfit, by as many
-    neighbours as it has more than coefficients.
+    or noisy the fit stays much the same. A point next to the edge may end between both sides: in the end it takes the
+    normal of the neighbour whose quadric fits best, to this point and to that neighbour's own side. How sure
+    an edge is follows from what is left of the misfit, by as many neighbours as it has more than coefficients.
 
     Parameters
     ----------
@@ -71,30 +76,44 @@ def find_sides(nearest: Nearest, quadrics: Quadrics) -> Sides:
         Of the points.
     """
     rows = np.flatnonzero(quadrics.misfit > LEFT * nearest.spacing)
-    normals, form, sharp = quadrics.normals.copy(), quadrics.shape_operator.copy(), np.zeros(len(quadrics.normals))
-    turning = rows
-    for _ in range(_ROUNDS):
-        last = normals.copy()
+    found, sharp = quadrics.take(np.arange(len(quadrics.misfit))), np.zeros(len(quadrics.misfit))
+    for beside in (False, True):
+        turning = rows
+        for _ in range(_ROUNDS):
 
-        def fit(part: slice, last: Floats = last, turning: Ints = turning) -> None:
-            some = turning[part]
-            index = nearest.index[some]
-            cosine = np.abs(np.einsum("ikc,ic->ik", last[index], last[some]))
-            weight = nearest.weight[some] * np.maximum((cosine - SMOOTH) / (1.0 - SMOOTH), 0.0) ** POWER
-            count = weight.sum(axis=1) ** 2 / np.maximum((weight**2).sum(axis=1), 1e-300)
-            enough = count > _COEFFICIENTS
-            sharp[some[~enough]] = 0.0
-            some, index, weight, count = some[enough], index[enough], weight[enough], count[enough]
-            fitted = fit_quadrics(nearest.points, index, weight, some, last[some])
-            normals[some], form[some] = fitted.normals, fitted.shape_operator
-            left = fitted.misfit / (np.sqrt(1.0 - _COEFFICIENTS / count) * quadrics.misfit[some])
-            sharp[some] = 1.0 - np.sqrt(np.minimum(left, 1.0))
+            def fit(part: slice, turning: Ints = turning, beside: bool = beside) -> tuple[Ints, Quadrics]:
+                some = turning[part]
+                index = nearest.index[some]
+                toward = found.normals[_closest(nearest, found, some) if beside else some]
+                cosine = np.abs(np.einsum("ikc,ic->ik", found.normals[index], toward))
+                weight = nearest.weight[some] * np.maximum((cosine - SMOOTH) / (1.0 - SMOOTH), 0.0) ** POWER
+                count = weight.sum(axis=1) ** 2 / np.maximum((weight**2).sum(axis=1), 1e-300)
+                enough = count > _COEFFICIENTS
+                sharp[some[~enough]] = 0.0
+                some, index, weight, count = some[enough], index[enough], weight[enough], count[enough]
+                fitted = fit_quadrics(nearest.points, index, weight, some, toward[enough])
+                left = fitted.misfit / (np.sqrt(1.0 - _COEFFICIENTS / count) * quadrics.misfit[some])
+                sharp[some] = 1.0 - np.sqrt(np.minimum(left, 1.0))
+                return some, fitted
 
-        on_all_cores(fit, blocks(len(turning), _BLOCK))
-        turned = 1.0 - np.abs(np.einsum("ij,ij->i", normals[turning], last[turning]))
-        turning = turning[turned > MET]
-        if not len(turning):
-            break
+            last = found.normals[turning]
+            for some, fitted in on_all_cores(fit, blocks(len(turning), _BLOCK)):
+                found.assign(some, fitted)
+            turned = 1.0 - np.abs(np.einsum("ij,ij->i", found.normals[turning], last))
+            turning = turning[turned > MET]
+            if not len(turning):
+                break
     lost = rows[sharp[rows] == 0.0]
-    normals[lost], form[lost] = quadrics.normals[lost], quadrics.shape_operator[lost]
-    return Sides(normals, form, sharp)
+    found.assign(lost, quadrics.take(lost))
+    return Sides(found.normals, found.shape_operator, sharp, quadrics.normals)
+
+
+def _closest(nearest: Nearest, quadrics: Quadrics, rows: Ints) -> Ints:
+    """Return which of the neighbors of some points, or these themselves, have the quadric that misses least, (k,).
+
+    What it misses are the neighbors that it was fitted to, and the point.
+    """
+    index = nearest.index[rows]
+    missed = np.hypot(heights_over(quadrics, nearest.points, index, rows[:, None]), quadrics.misfit[index])
+    missed[nearest.weight[rows] == 0.0] = np.inf
+    return index[np.arange(len(rows)), missed.argmin(axis=1)]

@@ -57,10 +57,14 @@ class Quadrics:
 
     def put(self, rows: Ints, others: "Quadrics") -> "Quadrics":
         """Return the same but for some rows, (k,) int, with the quadrics of others, of k points, in their place."""
-        result = {quantity.name: getattr(self, quantity.name).copy() for quantity in fields(self)}
-        for name, values in result.items():
-            values[rows] = getattr(others, name)
-        return Quadrics(**result)
+        result = self.take(np.arange(len(self.normals)))
+        result.assign(rows, others)
+        return result
+
+    def assign(self, rows: Ints, others: "Quadrics") -> None:
+        """Put the quadrics of others in the place of some, in these arrays themselves."""
+        for quantity in fields(self):
+            getattr(self, quantity.name)[rows] = getattr(others, quantity.name)
 
 
 def fit_quadrics(

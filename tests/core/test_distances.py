@@ -35,10 +35,11 @@ def test_arcs_are_exact_to_sixth_order(points, normals, exact, sign):
     i, j = pairs.first, pairs.second
     pairs = replace(pairs, distance=np.linalg.norm(pairs.points[j] - pairs.points[i], axis=1))
     sides = np.where(np.random.default_rng(0).random(len(pairs.points)) < 0.5, -1.0, 1.0) if sign != "alike" else 1.0
+    signed = (normals(pairs.points).T * sides).T
     cloud = replace(
         cloud,
         pairs=pairs,
-        sides=Sides((normals(pairs.points).T * sides).T, cloud.shape_operator, np.zeros(len(pairs.points))),
+        sides=Sides(signed, cloud.shape_operator, np.zeros(len(pairs.points)), signed),
         squared_slope=np.zeros(len(pairs.points)),
     )
     length = exact(pairs.points[i], pairs.points[j])
