@@ -26,7 +26,7 @@ class Mesh(SurfaceVerb):
             table = _on_vertices(cloud, laplacian, mesh.vertices)
             written = core.files.write_mesh(output, table, faces, double=not table.single)
         figures = {"vertices": len(mesh.vertices), "faces": sum(map(len, faces)), "open_edges": opened}
-        return {"points": len(cloud.points), **figures}, [*laplacian.notices, *written]
+        return {"points": len(cloud.points), **figures}, [*laplacian.notices, *mesh.notices, *written]
 
 
 def _on_vertices(cloud, laplacian, vertices):

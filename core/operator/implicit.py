@@ -78,6 +78,8 @@ class ImplicitSurface:
         The points on the surface in these units, from their middle on, and unit normals.
     spacing : ndarray, (m,)
         Distance between neighbouring points in these units; next to a change of density the larger one.
+    local_spacing : ndarray, (m,)
+        The same, everywhere that of the nearest points.
     """
 
     def __init__(self, laplacian: LaplaceBeltrami, unit: float) -> None:
@@ -86,7 +88,7 @@ class ImplicitSurface:
         points = self.scaled(laplacian.surface_points[kept])
         nearest = find_nearest(points)
         self.points, self._tree = points, nearest.tree
-        self.spacing = nearest.spacing.copy()
+        self.local_spacing, self.spacing = nearest.spacing, nearest.spacing.copy()
         # Where dense points end and sparse ones begin, the gap between them is as wide as those of the sparse ones.
         np.maximum.at(self.spacing, nearest.index, self.spacing[:, None] - nearest.distance / _BELONGS)
         self.normals, self._component = laplacian.normals[kept], laplacian.component[kept]

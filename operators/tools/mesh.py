@@ -51,12 +51,13 @@ class MeshSurface(Tool):
         def compute(progress):
             mesh, carrying = surface_mesh(operator(progress), detail, progress)
             faces = mesh.faces if np.linalg.det(reading.matrix) > 0.0 else mesh.faces[:, ::-1]
-            return reading.local(mesh.vertices), faces, kept.carried(carrying, len(mesh.vertices))
+            carried = kept.carried(carrying, len(mesh.vertices))
+            return reading.local(mesh.vertices), faces, carried, mesh.notices
 
         return compute
 
     def write(self, context, obj, result):
-        vertices, faces, carried = result
+        vertices, faces, carried, notices = result
         made = bpy.data.objects.new(f"{obj.name} Surface", _mesh(f"{obj.name} Surface", vertices, faces))
         for collection in obj.users_collection:
             collection.objects.link(made)
@@ -68,7 +69,7 @@ class MeshSurface(Tool):
             setattr(made.meshfree, name, getattr(obj.meshfree, name))
         self.made = (*self.made, (obj.name, made.name, opened))
         state = "closed" if not opened else "open"
-        return [f"{made.name}: {len(made.data.polygons):,} faces, {state}. The points are hidden"]
+        return [*notices, f"{made.name}: {len(made.data.polygons):,} faces, {state}. The points are hidden"]
 
     def conclude(self, context, objects):
         """Show the meshes like their points, and hide these."""

@@ -1,6 +1,7 @@
 """Meshes of the surface that points lie on, against surfaces that are known."""
 
 import functools
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,10 @@ from scipy.spatial.transform import Rotation
 import core
 from benchmarks.awkward import box
 from benchmarks.samplings import fibonacci_sphere, random_sphere, square_random
+from core import cores
+from core.applications.surfaces import meshing
+from core.applications.surfaces.grid import grid_around
+from core.applications.surfaces.quads import all_quads
 from core.applications.surfaces.sides import agreeing
 
 
@@ -56,7 +61,8 @@ def test_sphere(operators, meshes, name, detail):
     assert np.abs(np.linalg.norm(mesh.vertices, axis=1) - 1.0).max() < 0.05 * spacing
     centers = mesh.vertices[mesh.faces].mean(axis=1)
     assert np.abs(np.linalg.norm(centers, axis=1) - 1.0).max() < 0.1 * spacing
-    assert cKDTree(centers).query(laplacian.points)[0].max() < 1.2 * spacing / detail  # it leaves no point out
+    apart = np.maximum(spacing, np.sqrt(laplacian.areas))  # of the points there
+    assert np.all(cKDTree(centers).query(laplacian.points)[0] < 1.2 * apart / detail)  # it leaves no point out
     assert area_of(mesh) == pytest.approx(4.0 * np.pi, rel=0.01)
     assert np.all(np.einsum("ij,ij->i", areas_of(mesh), centers) > 0.0)  # faces look outwards
     edge = np.linalg.norm(mesh.vertices[mesh.faces[:, 0]] - mesh.vertices[mesh.faces[:, 1]], axis=1)
@@ -208,3 +214,172 @@ def test_detail_that_no_memory_holds(operators):
 def test_detail_coarser_than_the_surface(operators):
     with pytest.raises(core.PointCloudError, match="Raise the detail"):
         core.mesh_surface(operators("even sphere"), 1e-3)
+
+
+def two_sheets(ratio, count=900, seed=0):
+    """Return a square of dense points beside one of points that are a ratio as far apart, in one component."""
+    rng = np.random.default_rng(seed)
+    side = np.sqrt(count)
+    dense = rng.random((count, 2)) * [side, side] - [side, 0.5 * side]
+    sparse = rng.random((count, 2)) * [side * ratio, side * ratio] - [0.0, 0.5 * side * ratio]
+    return np.pad(np.concatenate([dense, sparse]), ((0, 0), (0, 1)))
+
+
+def hopf_torus(across, around, waves=3, height=0.5):
+    """Return points of the image in space of the circles of Hopf's fibration over a closed curve, (n, 3)."""
+    along, fiber = np.meshgrid(
+        2.0 * np.pi * np.arange(across) / across, 2.0 * np.pi * np.arange(around) / around, indexing="ij"
+    )
+    half = 0.25 * np.pi + 0.5 * height * np.sin(waves * along)
+    first, second = np.cos(half) * np.exp(1j * fiber), np.sin(half) * np.exp(1j * (fiber + along))
+    places = np.stack([first.real, first.imag, second.real], axis=-1) / (1.0 - second.imag)[..., None]
+    return places.reshape(-1, 3)
+
+
+class TestDensitiesThatMeet:
+    def statue(self, dense, sparse, half):
+        rng = np.random.default_rng(4)
+        plaza = np.pad(rng.uniform(-half, half, (sparse, 2)), ((0, 0), (0, 1)))
+        return np.concatenate([0.25 * random_sphere(dense) + [0.0, 0.0, 0.6], plaza])
+
+    @pytest.mark.parametrize("half", [2.0, 10.0, 40.0])
+    def test_a_statue_on_a_plaza(self, half):
+        points = self.statue(3000, 800, half)
+        mesh = core.mesh_surface(core.build_laplacian(points))
+        assert mesh.notices == []
+        assert len(mesh.faces) < 4 * len(points)
+        low = mesh.vertices[mesh.faces].mean(axis=1)[:, 2] < 0.2
+        areas = np.linalg.norm(areas_of(mesh), axis=1)
+        assert areas[~low].sum() == pytest.approx(np.pi / 4.0, rel=0.01)
+        assert areas[low].sum() == pytest.approx(4.0 * half**2, rel=0.05)
+        assert edges_of(mesh).max() == 2
+        statue = np.linalg.norm(mesh.vertices - [0.0, 0.0, 0.6], axis=1) < 0.3
+        assert np.abs(np.linalg.norm(mesh.vertices[statue] - [0.0, 0.0, 0.6], axis=1) - 0.25).max() < 1e-3
+
+    def test_a_dense_part_that_is_small_is_not_lost(self):
+        mesh = core.mesh_surface(core.build_laplacian(self.statue(1500, 6000, 10.0)))
+        low = mesh.vertices[mesh.faces].mean(axis=1)[:, 2] < 0.2
+        assert np.linalg.norm(areas_of(mesh), axis=1)[~low].sum() == pytest.approx(np.pi / 4.0, rel=0.02)
+
+    @pytest.mark.parametrize("ratio", [3.0, 11.0, 27.0, 100.0])
+    def test_side_by_side(self, ratio):
+        points = two_sheets(ratio)
+        laplacian = core.build_laplacian(points)
+        mesh = core.mesh_surface(laplacian)
+        assert len(mesh.faces) < 6 * len(points)
+        assert edges_of(mesh).max() == 2
+        assert np.abs(mesh.vertices[:, 2]).max() < 1e-6
+        assert area_of(mesh) == pytest.approx(900.0 * (1.0 + ratio**2), rel=0.06)
+        assert np.all(np.ptp(np.sort(mesh.faces, axis=1), axis=1) > 0)
+        assert all(len(set(face)) == 4 for face in mesh.faces.tolist())  # quads all over
+
+    @pytest.mark.parametrize("height", [0.45, 0.8])
+    def test_hopf_torus(self, height):
+        points = hopf_torus(60, 30, height=height)
+        laplacian = core.build_laplacian(points)
+        assert laplacian.areas.max() > 30.0 * laplacian.areas.min()
+        mesh = core.mesh_surface(laplacian)
+        assert np.all(edges_of(mesh) == 2)
+        assert euler_characteristic(mesh) == 0
+        assert len(mesh.faces) < 6 * len(points)
+        assert area_of(mesh) == pytest.approx(area_of(core.SurfaceMesh(*fine_hopf_torus(height))), rel=0.03)
+
+    def test_components_of_all_sizes(self):
+        ball = fibonacci_sphere(800)
+        points = np.concatenate([ball * size + [3.0 * place, 0.0, 0.0] for place, size in enumerate((1.0, 0.1, 0.01))])
+        mesh = core.mesh_surface(core.build_laplacian(points))
+        assert np.all(edges_of(mesh) == 2)
+        assert euler_characteristic(mesh) == 6
+        for place, size in enumerate((1.0, 0.1, 0.01)):
+            apart = np.linalg.norm(mesh.vertices - [3.0 * place, 0.0, 0.0], axis=1)
+            np.testing.assert_allclose(apart[apart < 1.5 * size], size, rtol=3e-3)
+
+    def test_what_is_needed_is_in_proportion_to_the_points(self, monkeypatch):
+        needed = []
+        monkeypatch.setattr(meshing, "available_memory", lambda: 1)
+        for half in 2.0, 10.0, 40.0:
+            laplacian = core.build_laplacian(self.statue(3000, 800, half))
+            with pytest.raises(core.NotEnoughMemoryError) as caught:
+                core.mesh_surface(laplacian)
+            needed.append(float(str(caught.value).partition(" about ")[2].split()[0]))
+        assert max(needed) < 0.1  # GB
+
+    def test_a_few_sparse_points_beside_many_dense_ones(self, monkeypatch):
+        grids = []
+        monkeypatch.setattr(meshing, "grid_around", lambda *given: grids.append(grid_around(*given)) or grids[-1])
+        rng = np.random.default_rng(1)
+        dense = rng.random((4000, 2)) * [63.2, 63.2] - [63.2, 0.0]
+        sparse = rng.random((40, 2)) * [63.2, 63.2]
+        points = np.pad(np.concatenate([dense, sparse]), ((0, 0), (0, 1)))
+        points[:, 2] = 6.0 * np.sin(0.05 * points[:, 0])
+        mesh = core.mesh_surface(core.build_laplacian(points))
+        assert len(mesh.faces) < 2.5 * len(points)
+        assert len(grids[0].corners) < 10 * len(points)
+
+    @pytest.mark.parametrize(("across", "detail"), [(50, 1.0), (30, 2.0)])
+    def test_the_check_before_is_right_within_a_factor_of_two(self, across, detail, monkeypatch):
+        monkeypatch.setenv(cores.VARIABLE, "1")  # more of them take blocks of their own
+        laplacian = core.build_laplacian(hopf_torus(2 * across, across))
+        with monkeypatch.context() as patch:
+            patch.setattr(meshing, "available_memory", lambda: 1)
+            with pytest.raises(core.NotEnoughMemoryError) as caught:
+                core.mesh_surface(laplacian, detail)
+        expected = float(str(caught.value).partition(" about ")[2].split()[0]) * 2.0**30
+        tracemalloc.start()
+        core.mesh_surface(laplacian, detail)
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        assert 0.5 * peak < expected < 2.0 * peak
+
+    def test_points_without_a_mesh_are_told(self):
+        cube = np.random.default_rng(2).uniform(-0.4, 0.4, (1200, 3)) + [3.0, 0.0, 0.0]
+        laplacian = core.build_laplacian(np.concatenate([random_sphere(2000), cube]))
+        (notice,) = core.mesh_surface(laplacian).notices
+        number = int(notice.split()[3].replace(",", ""))
+        assert 0.1 * len(cube) < number < len(cube)
+
+
+def fine_hopf_torus(height, across=600, around=300):
+    """Return vertices and quads of the same torus as `hopf_torus` has."""
+    number = np.arange(across * around).reshape(across, around)
+    right, up = np.roll(number, -1, axis=0), np.roll(number, -1, axis=1)
+    quads = np.stack([number, right, np.roll(right, -1, axis=1), up], axis=-1).reshape(-1, 4)
+    return hopf_torus(across, around, height=height), quads
+
+
+class TestQuads:
+    def test_triangles_in_pairs(self):
+        # Two triangles with a quad between them: each side between them is divided.
+        places = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0.5, 0], [-1, 0.5, 0]], dtype=float)
+        faces = np.array([[0, 1, 2, 3], [1, 4, 2, 2], [0, 0, 3, 5]])
+        vertices, quads, sizes = all_quads(places, faces, np.arange(6.0))
+        assert len(quads) in {3, 4}
+        assert all(len(set(quad)) == 4 for quad in quads.tolist())
+        np.testing.assert_array_equal(vertices[:6], places)
+        assert len(sizes) == len(vertices)
+        mesh = core.SurfaceMesh(vertices, quads)
+        assert area_of(mesh) == pytest.approx(2.0)
+        assert np.all(areas_of(mesh)[:, 2] > 0.0)
+
+    @pytest.mark.parametrize("seed", range(4))
+    def test_a_closed_surface_of_triangles_and_quads(self, seed):
+        # A cube of quads, some of which are divided to two triangles, wherever they lie.
+        rng = np.random.default_rng(seed)
+        mesh = core.mesh_surface(core.build_laplacian(fibonacci_sphere(400)))
+        cut = rng.random(len(mesh.faces)) < rng.choice([0.01, 0.2, 1.0])
+        cut[rng.integers(len(cut))] = True
+        a, b, c, d = mesh.faces[cut].T
+        faces = np.concatenate([mesh.faces[~cut], np.stack([a, b, c, c], axis=1), np.stack([c, d, a, a], axis=1)])
+        vertices, quads, _ = all_quads(mesh.vertices, faces[rng.permutation(len(faces))], np.ones(len(mesh.vertices)))
+        made = core.SurfaceMesh(vertices, quads)
+        assert all(len(set(quad)) == 4 for quad in quads.tolist())
+        assert np.all(edges_of(made) == 2)
+        assert euler_characteristic(made) == 2
+        outwards = np.einsum("ij,ij->i", areas_of(made), made.vertices[made.faces].mean(axis=1))
+        assert np.all(outwards > 0.0)
+
+    def test_a_single_triangle_ends_at_an_open_edge(self):
+        places = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0.5, 0]], dtype=float)
+        vertices, quads, _ = all_quads(places, np.array([[0, 1, 2, 3], [1, 4, 2, 2]]), np.ones(5))
+        assert all(len(set(quad)) == 4 for quad in quads.tolist())
+        assert area_of(core.SurfaceMesh(vertices, quads)) == pytest.approx(1.5)

@@ -144,7 +144,7 @@ def cross_section(
         curves=curves,
         length=sum(curve.length for curve in curves),
         enclosed_area=float(areas.sum()),
-        notices=_notices(curves, len(lines) - len(kept), flat),
+        notices=mesh.notices + _notices(curves, len(lines) - len(kept), flat),
     )
 
 

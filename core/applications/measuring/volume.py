@@ -120,7 +120,8 @@ def enclosed_volume(
         volumes=volumes,
         uncertainties=off,
         openings=np.bincount(caps.component, minlength=count),
-        notices=_notices(np.bincount(skin.component, minlength=count), caps.component, inside, skin.mixed()),
+        notices=mesh.notices
+        + _notices(np.bincount(skin.component, minlength=count), caps.component, inside, skin.mixed()),
     )
 
 

@@ -1,6 +1,7 @@
-"""A mesh of the surface that the points lie on: surface nets on a sparse grid near the points."""
+"""A mesh of the surface that the points lie on: surface nets on a grid near the points, finer where these are."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -9,30 +10,31 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ...algebra import blocks, on_all_cores
 from ...arguments import positive
 from ...cores import cores
 from ...errors import NotEnoughMemoryError, PointCloudError
 from ...geometry import Prolongation, check_points
 from ...memory import available_memory
 from ...operator import ImplicitSurface, LaplaceBeltrami
-from ...types import Bools, Floats, Ints, Progress
+from ...types import Array, Bools, Floats, Ints, Progress
+from .grid import Grid, Levels, count_corners, grid_around, octaves_of
+from .quads import all_quads
 from .sides import find_sides
 
-_BAND = 1.8  # voxels on both sides of the surface: an edge of the grid that it cuts ends within one
-_REACH = 3.0  # spacings along the surface around a point: wider gaps are holes
 _COVERED = 1.5  # voxels between a point and the next cut, at most, where a mesh passes
 _BARE = 0.05  # share of the points that may stay without a mesh; less than 0.002 do where sides are found
+_TOLD = 0.02  # share of them beyond which it is told
 _ROUNDS = 2  # of moving vertices onto the surface, after which errors are a thousandth of a voxel
 _FRAGMENT = 20.0  # Voronoi cells that a component of the mesh covers at least: smaller ones are left out
 _FEWEST = 20  # faces of a mesh
-_CANDIDATES = 1 << 20  # corners of the grid examined at one time
-_BYTES = 1200  # of memory for each voxel of the grid that meets the surface, at the peak
+_BYTES = 700  # of memory for each corner of the grid, at the peak
+_ALONE = 30_000_000  # bytes that the smallest mesh takes
 _SHARE = 0.8  # of the free memory, which other programs need as well
 
 
-class SurfaceMesh(NamedTuple):
-    """A mesh of a surface.
+@dataclass(frozen=True)
+class SurfaceMesh:
+    """A mesh of a surface, which unpacks to its vertices and faces.
 
     Attributes
     ----------
@@ -40,18 +42,26 @@ class SurfaceMesh(NamedTuple):
         Positions on the surface [L].
     faces : ndarray, (q, 4) int
         Quads, by their vertices: counterclockwise as seen against the normals.
+    notices : list of str
+        Texts for the user: points without a mesh near them.
     """
 
     vertices: Floats
     faces: Ints
+    notices: list[str] = field(default_factory=list)
+
+    def __iter__(self) -> Iterator[Array]:
+        return iter((self.vertices, self.faces))
 
 
 def mesh_surface(laplacian: LaplaceBeltrami, detail: float = 1.0, *, progress: Progress | None = None) -> SurfaceMesh:
     """Make a mesh of the surface that the points lie on.
 
-    Quadrics of near points give the distance of corners of a regular grid from the surface, in a narrow band around
-    it, and which of them are on the same side: signs of normals do not matter. Each voxel that the surface cuts gets
-    a vertex and each cut edge a quad (surface nets); the vertices are then moved onto the surface, to which they are as
+    Quadrics of near points give the distance of corners of a grid from the surface, in a narrow band around it, and
+    which of them are on the same side: signs of normals do not matter. Voxels are as wide as the median spacing of the
+    points; where this varies much, as wide as that of the points there, to a factor of two: those of an octree. Each
+    voxel that the surface cuts gets a vertex and each cut edge a face (surface nets); where a voxel meets smaller ones,
+    sides of faces are divided so that all are quads; the vertices are then moved onto the surface, to which they are as
     close as the quadrics: an error of third order in the spacing. Where the points end, at a boundary or at gaps of
     several spacings, the mesh ends too.
 
@@ -73,7 +83,7 @@ def mesh_surface(laplacian: LaplaceBeltrami, detail: float = 1.0, *, progress: P
     PointCloudError
         A detail that is not above zero, or so fine or so coarse that there is no mesh.
     NotEnoughMemoryError
-        More voxels than the free memory is enough for, before the start.
+        A grid of more corners than the free memory is enough for, before the start.
 
     See Also
     --------
@@ -82,7 +92,8 @@ def mesh_surface(laplacian: LaplaceBeltrami, detail: float = 1.0, *, progress: P
 
     References
     ----------
-    S. F. F. Gibson, Constrained elastic surface nets, 1998; R. Kolluri, Provably good moving least squares, 2008.
+    S. F. F. Gibson, Constrained elastic surface nets, 1998; R. Kolluri, Provably good moving least squares, 2008;
+    T. Ju, F. Losasso, S. Schaefer, J. Warren, Dual contouring of Hermite data, 2002.
 
     Examples
     --------
@@ -102,22 +113,28 @@ def mesh_surface(laplacian: LaplaceBeltrami, detail: float = 1.0, *, progress: P
     size = positive(detail, "detail of the mesh")
     report("Grid", 0.5)
     kept = laplacian.component >= 0
-    spacing = np.sqrt(np.median(laplacian.areas[kept]))
-    voxel = spacing / size
-    places = laplacian.areas[kept].sum() / voxel**2
-    _check_memory(places, size)
+    voxel = np.sqrt(np.median(laplacian.areas[kept])) / size
     surface = ImplicitSurface(laplacian, voxel)
-    grid, keys = _band(surface, lambda: report("Grid", 0.55))
-    cuts = _cuts(surface, grid, keys, lambda: report("Grid", 0.7))
+    areas = laplacian.areas[kept] / voxel**2
+    usual = size * np.median(surface.local_spacing / np.sqrt(areas))
+    octaves = octaves_of(surface, areas, usual)
+    _check_memory(count_corners(surface, areas, 2.0**octaves), size)
+    levels = Levels(surface.points, octaves)
+    width: Array = levels.unit * 2.0 ** levels.at_points(surface.points)
+    _check_memory(count_corners(surface, areas, width), size)  # more of them next to smaller voxels
+    grid = grid_around(surface, levels, lambda: report("Grid", 0.55))
+    cuts = _cuts(surface, grid, width, lambda: report("Grid", 0.7))
     report("Faces", 0.85)
-    vertices, faces = _without_fragments(*_quads(grid, *cuts), _FRAGMENT * size**2)
-    if not len(faces) or places < _FEWEST:
+    vertices, faces, sizes = _without_fragments(*_polygons(grid, cuts), _FRAGMENT * size**2)
+    if not len(faces) or len(faces) < _FEWEST:
         raise PointCloudError(
             f"The {np.count_nonzero(kept)} points give no mesh at a detail of {size:g}: voxels are larger than the"
             " surface, or too few points lie between its edges. Raise the detail, or add points."
         )
-    vertices = _onto(surface, vertices, _boundary(faces), lambda: report("Faces", 0.9))
-    return SurfaceMesh(surface.placed(vertices), faces)
+    vertices, faces, sizes = all_quads(vertices, faces, sizes)
+    vertices = _onto(surface, vertices, _boundary(faces), sizes, lambda: report("Faces", 0.9))
+    bare = _bare(surface, np.concatenate([vertices, vertices[faces].mean(axis=1)]), width)
+    return SurfaceMesh(surface.placed(vertices), faces, _notices(bare))
 
 
 def values_on_mesh(
@@ -153,188 +170,164 @@ def values_on_mesh(
     return Prolongation(places, subset, laplacian.normals, laplacian.component, progress=progress)
 
 
-def _check_memory(places: float, detail: float) -> None:
+def _check_memory(corners: float, detail: float) -> None:
     """Refuse a mesh that needs more than the free memory."""
-    free = available_memory()
-    if free is not None and _BYTES * places > _SHARE * free:
+    free, needed = available_memory(), _ALONE + _BYTES * corners
+    if free is not None and needed > _SHARE * free:
         raise NotEnoughMemoryError(
-            f"A mesh at a detail of {detail:g} would take about {_BYTES * places / 2**30:.1f} GB of memory, and"
-            f" {free / 2**30:.1f} GB are free. Lower the detail, or free memory.",
-            fitting=int(_SHARE * free / _BYTES),
+            f"A mesh at a detail of {detail:g} would take about {needed / 2**30:.3g} GB of memory, and"
+            f" {free / 2**30:.3g} GB are free. Lower the detail, or free memory.",
+            fitting=max(int((_SHARE * free - _ALONE) / _BYTES), 0),
         )
 
 
-class _Grid:
-    """Corners of voxels of size one, numbered by int64, (k,)."""
+class _Cuts(NamedTuple):
+    """The edges of a grid that a surface cuts.
 
-    def __init__(self, points: Floats, margin: float) -> None:
-        self.low = np.floor(points.min(axis=0)) - margin
-        counts = np.ceil(np.ptp(points, axis=0)) + 2.0 * margin + 2.0
-        if np.prod(counts) > 2.0**62:
-            raise PointCloudError(
-                "The extent of the points is too large relative to their spacing for a grid. Delete distant points, or"
-                " lower the detail."
-            )
-        self.steps = np.array([counts[1] * counts[2], counts[2], 1.0]).astype(np.int64)
-
-    def keys(self, corners: Floats) -> Ints:
-        """Return the numbers of corners, (..., 3) float whole numbers as from `corners`."""
-        return (corners - self.low).astype(np.int64) @ self.steps
-
-    def corners(self, keys: Ints) -> Floats:
-        """Return the positions of corners, (k, 3) float."""
-        first, rest = np.divmod(keys, self.steps[0])
-        second, third = np.divmod(rest, self.steps[1])
-        return np.column_stack([first, second, third]) + self.low
-
-
-def _band(surface: ImplicitSurface, report: Callable[[], None]) -> tuple[_Grid, Ints]:
-    """Return a grid and its corners near the surface as sorted numbers: within gaps of the points, and above them."""
-    reach = _REACH * surface.spacing + 1.0
-    grid = _Grid(surface.points, np.ceil(reach.max()) + 3.0)
-    order = np.argsort(grid.keys(np.floor(surface.points / 8.0) * 8.0), kind="stable")  # neighbours work together
-    half = np.ceil(np.hypot(reach, _BAND)).astype(int)
-    tasks = []
-    for size in np.unique(half):
-        rows = order[half[order] == size]
-        across = np.arange(-size, size + 1)
-        steps = np.stack(np.meshgrid(across, across, across, indexing="ij"), axis=-1).reshape(-1, 3)
-        tasks += [(rows[block], steps) for block in blocks(len(rows), max(_CANDIDATES // len(steps), 1))]
-
-    def near(task: tuple[Ints, Ints]) -> Ints:
-        rows, steps = task
-        corner = np.round(surface.points[rows])
-        shift = surface.points[rows] - corner
-        normals = surface.normals[rows]
-        squared = -2.0 * shift @ steps.T + (steps * steps).sum(axis=1) + (shift * shift).sum(axis=1)[:, None]
-        height = normals @ steps.T - np.einsum("ij,ij->i", normals, shift)[:, None]
-        bend = surface.half_curvature(rows)[:, None] * squared
-        inside = (np.abs(height) < _BAND + bend) & (squared < (reach[rows] ** 2 + _BAND**2)[:, None])
-        row, step = np.nonzero(inside)
-        return np.unique(grid.keys(corner)[row] + (steps @ grid.steps)[step])
-
-    found = on_all_cores(near, tasks, report)
-    return grid, np.unique(np.concatenate(found))
-
-
-def _cuts(
-    surface: ImplicitSurface, grid: _Grid, keys: Ints, report: Callable[[], None]
-) -> tuple[Ints, Ints, Bools, Floats, Bools]:
-    """Find the edges of the grid that the surface cuts.
-
-    Returns
-    -------
-    ndarrays, (k,) int, (k,) int, (k,) bool, (k, 3), (k,) bool
-        The corner each begins at, its axis, whether the outer side is ahead along it, where it is cut, and whether
-        the surface there is that of the points.
+    Attributes
+    ----------
+    edges : ndarray, (k,) int
+    ahead : ndarray, (k,) bool
+        Whether the outer side is ahead along them.
+    places : ndarray, (k, 3)
+        Where they are cut.
+    belongs : ndarray, (k,) bool
+        Whether the surface there is that of the points.
     """
-    corners = grid.corners(keys)
-    there = surface.heights(corners, report)
-    edges = []
-    for axis, step in enumerate(grid.steps):
-        place = np.minimum(np.searchsorted(keys, keys + step), len(keys) - 1)
-        begin = np.flatnonzero(keys[place] == keys + step)
-        edges.append((begin, place[begin], np.full(len(begin), axis)))
-    first, second, axis = (np.concatenate(part) for part in zip(*edges, strict=True))
+
+    edges: Ints
+    ahead: Bools
+    places: Floats
+    belongs: Bools
+
+
+def _cuts(surface: ImplicitSurface, grid: Grid, width: Array, report: Callable[[], None]) -> _Cuts:
+    """Find the edges of a grid that the surface cuts, by the width of the voxels at the points, (m,)."""
+    there = surface.heights(grid.places, report)
     wrong = np.zeros(len(surface.points), dtype=bool)
     for around in True, False:
         surface.flip(wrong)  # as they were
-        side = find_sides(surface, there, corners, first, second, around)
+        side = find_sides(surface, there, grid, around)
         wrong = np.bincount(there.nearest, side * there.height, len(surface.points)) < 0.0
         surface.flip(wrong)
-        edge, cut, belongs = _between(surface, corners, first, second, axis, side, report)
+        cuts = _between(surface, grid, side, report)
         # Paths around that lead through a gap instead of around a thin part lose the surface between.
-        if _bare(surface, cut[belongs]) <= _BARE:
+        if np.mean(_bare(surface, cuts.places[cuts.belongs], width)) <= _BARE:
             break
-    return keys[first[edge]], axis[edge], side[first[edge]] < 0.0, cut, belongs
+    return cuts
 
 
-def _between(
-    surface: ImplicitSurface,
-    corners: Floats,
-    first: Ints,
-    second: Ints,
-    axis: Ints,
-    side: Floats,
-    report: Callable[[], None],
-) -> tuple[Ints, Floats, Bools]:
-    """Find the edges between corners on two sides.
+def _between(surface: ImplicitSurface, grid: Grid, side: Floats, report: Callable[[], None]) -> _Cuts:
+    """Find the edges between corners on two sides, (c,)."""
+    edges = np.flatnonzero(side[grid.first] != side[grid.second])
+    first, second, axis, length = (values[edges] for values in (grid.first, grid.second, grid.axis, grid.length))
+    places, nearest = grid.places[first], surface.nearest(0.5 * (grid.places[first] + grid.places[second]))
+    low, high = surface.over(nearest, grid.places[first]), surface.over(nearest, grid.places[second])
+    crossed = (low < 0.0) != (high < 0.0)  # elsewhere it is closed around sharp edges
+    share = np.where(crossed, low / np.where(crossed, low - high, 1.0), 0.5)
+    places[np.arange(len(edges)), axis] += length * share
+    return _Cuts(edges, side[first] < 0.0, places, surface.heights(places, report).belongs)
+
+
+def _bare(surface: ImplicitSurface, places: Floats, width: Array) -> Bools:
+    """Tell which points have no mesh near them, whose places are given, by the width of the voxels there, (m,) bool."""
+    if not len(places):
+        return np.ones(len(surface.points), dtype=bool)
+    apart = cKDTree(places).query(surface.points, distance_upper_bound=_COVERED * width.max(), workers=cores())[0]
+    return apart > _COVERED * width
+
+
+def _notices(bare: Bools) -> list[str]:
+    """Return a text on the points without a mesh, (n,) bool, if there are more than a few."""
+    share = np.mean(bare)
+    if share <= _TOLD:
+        return []
+    return [
+        f"The mesh misses {np.count_nonzero(bare):,} of {len(bare):,} points ({share:.0%}). Where sheets are close,"
+        " raise the detail; points that fill a volume have no surface."
+    ]
+
+
+def _polygons(grid: Grid, cuts: _Cuts) -> tuple[Floats, Ints, Floats]:
+    """Return the vertices of the voxels that are cut, each the mean of its cuts, and a face around each that belongs.
+
+    A voxel that several sheets cut has a vertex for each. A face has three vertices where one voxel is larger than the
+    others around an edge: two that follow each other are the same.
 
     Returns
     -------
-    ndarrays, (k,) int, (k, 3), (k,) bool
-        Their numbers, where they are cut, and whether the surface there is that of the points.
+    ndarrays, (v, 3), (q, 4) int, (v,)
+        Vertices, faces, and the lengths of the edges around each vertex.
     """
-    edge = np.flatnonzero(side[first] != side[second])
-    first, second, axis = first[edge], second[edge], axis[edge]
-    cut, nearest = corners[first], surface.nearest(0.5 * (corners[first] + corners[second]))
-    low, high = surface.over(nearest, corners[first]), surface.over(nearest, corners[second])
-    crossed = (low < 0.0) != (high < 0.0)  # elsewhere it is closed around sharp edges
-    cut[np.arange(len(cut)), axis] += np.where(crossed, low / np.where(crossed, low - high, 1.0), 0.5)
-    return edge, cut, surface.heights(cut, report).belongs
-
-
-def _bare(surface: ImplicitSurface, cut: Floats) -> float:
-    """Return the share of points without a cut near them, which get no mesh."""
-    if not len(cut):
-        return 1.0
-    apart = cKDTree(cut).query(surface.points, distance_upper_bound=_COVERED, workers=cores())[0]
-    return np.mean(np.isinf(apart))
-
-
-def _quads(grid: _Grid, begin: Ints, axis: Ints, forward: Bools, cut: Floats, belongs: Bools) -> tuple[Floats, Ints]:
-    """Return the vertices of the voxels that are cut, each the mean of its cuts, and a quad around each that belongs.
-
-    A voxel that several sheets cut has a vertex for each.
-    """
-    own, second, third = (grid.steps[(axis + shift) % 3] for shift in range(3))
-    around = begin[:, None] - np.stack([np.zeros_like(second), second, second + third, third], axis=1)
-    sides = np.stack([begin, begin - second, begin - third, begin], axis=1)  # faces of voxels between those around
-    sides = 3 * sides + np.stack([axis + 1, axis + 2, axis + 1, axis + 2], axis=1) % 3
-    inner = np.where(forward, begin, begin + own)
-    corner = _joined(around, sides.ravel(), np.repeat(inner, 4))
+    corner = _joined(grid, cuts)
     count = np.bincount(corner)
-    total = [np.bincount(corner, np.repeat(column, 4)) for column in cut.T]
-    vertices = np.column_stack(total) / count[:, None]
+    total = [np.bincount(corner, np.repeat(column, 4)) for column in (*cuts.places.T, grid.length[cuts.edges])]
+    values = np.column_stack(total) / count[:, None]
     faces = corner.reshape(-1, 4)
-    faces = np.where(forward[:, None], faces, faces[:, ::-1])[belongs]
-    return vertices, faces
+    faces = np.where(cuts.ahead[:, None], faces, faces[:, ::-1])[cuts.belongs]
+    return values[:, :3], faces, values[:, 3]
 
 
-def _joined(around: Ints, sides: Ints, inner: Ints) -> Ints:
-    """Number the vertices of quads so that each of their edges has two quads at most, (4 q,) int.
+def _joined(grid: Grid, cuts: _Cuts) -> Ints:
+    """Number the vertices around cut edges so that each edge of a face has another face at most, (4 k,) int.
 
-    Parameters
-    ----------
-    around : ndarray, (q, 4) int
-        Voxels of the corners of quads.
-    sides : ndarray, (4 q,) int
-        What each edge, from one corner to the next, crosses: a face between two voxels.
-    inner : ndarray, (4 q,) int
-        The corner of the grid below the surface at each. Where four quads meet, two sheets pass: those of a quad and of
-        the other one around the same corner.
+    Each edge from one vertex to the next passes a face between two voxels. As many pass it as edges around it are cut;
+    where these are more than two, several sheets do: one around each row of corners below the surface.
     """
-    _, meeting, count = np.unique(sides, return_inverse=True, return_counts=True)
-    meeting = meeting.reshape(-1)
-    several = np.where(count[meeting] > 2, inner, -1)
-    order = np.lexsort([several, meeting])
-    same = (np.diff(meeting[order]) == 0) & (np.diff(several[order]) == 0)
-    ends = np.arange(4 * len(around)).reshape(-1, 4)
+    around, level = grid.around(cuts.edges)
+    voxel, count = grid.levels.keys(around), len(around)
+    begin, axis, length = (values[cuts.edges] for values in (grid.corners[grid.first], grid.axis, grid.length))
+    ends = np.arange(4 * count).reshape(-1, 4)
     ends = np.stack([ends, np.roll(ends, -1, axis=1)], axis=2).reshape(-1, 2)
-    ends = np.take_along_axis(ends, np.argsort(around.ravel()[ends], axis=1), axis=1)[order]
-    first, second = ends[:-1][same].ravel(), ends[1:][same].ravel()
-    graph = sparse.coo_array((np.ones(len(first), dtype=bool), (first, second)), shape=(around.size, around.size))
+    one, other = voxel.ravel()[ends].T
+    inside = np.flatnonzero(one == other)
+    passing = np.flatnonzero(one != other)
+
+    # The face is that of the smaller voxel; it lies across the second or the third axis.
+    small = np.where(level.ravel()[ends[passing, 0]] <= level.ravel()[ends[passing, 1]], *ends[passing].T)
+    level, low = level.ravel()[small], around.reshape(-1, 3)[small]
+    edge, row = passing // 4, np.arange(len(passing))
+    across = (axis[edge] + np.where(passing % 2 == 0, 1, 2)) % 3
+    low[row, across] = begin[edge, across]
+    _, face, number = np.unique(3 * grid.levels.keys(low) + across, return_inverse=True, return_counts=True)
+    face = face.reshape(-1)
+
+    # Around the face, counterclockwise: where its outline goes below the surface, and where it comes back next.
+    angle, enters = np.zeros(len(passing)), np.zeros(len(passing), dtype=bool)
+    several = np.flatnonzero(number[face] > 2)
+    wide = 0.5 * 2.0 ** level[several]
+    middle = low[several] + wide[:, None]
+    half = 0.5 * length[edge[several]] / grid.levels.unit
+    along = np.eye(3)[axis[edge[several]]]
+    offset = begin[edge[several]] + half[:, None] * along - middle
+    toward = np.where(cuts.ahead[edge[several]], -1.0, 1.0)[:, None] * along
+    plane = (across[several, None] + [1, 2]) % 3
+    (x, y), (u, v) = (np.take_along_axis(vector, plane, axis=1).T for vector in (offset, toward))
+    angle[several] = np.arctan2(y, x)
+    enters[several] = x * v - y * u > 0.0
+    order = np.lexsort([angle, face])
+    start = np.concatenate([[0], np.cumsum(number)[:-1]])
+    late = order[start[(number > 2) & ~enters[order[start]]]]
+    angle[late] += 2.0 * np.pi
+    order = np.lexsort([angle, face])
+    first = np.flatnonzero((np.arange(len(order)) - start[face[order]]) % 2 == 0)
+    first = first[first + 1 < len(order)]
+    first = first[face[order[first]] == face[order[first + 1]]]
+    ends = np.take_along_axis(ends, np.argsort(voxel.ravel()[ends], axis=1), axis=1)
+    pairs = ends[passing[order]]
+    one, other = (np.concatenate([pairs[first + shift].ravel(), ends[inside, shift]]) for shift in range(2))
+    graph = sparse.coo_array((np.ones(len(one), dtype=bool), (one, other)), shape=(4 * count,) * 2)
     return connected_components(graph, directed=False)[1]
 
 
-def _without_fragments(vertices: Floats, faces: Ints, least: float) -> tuple[Floats, Ints]:
+def _without_fragments(vertices: Floats, faces: Ints, sizes: Floats, least: float) -> tuple[Floats, Ints, Floats]:
     """Leave out the components of less than so many faces, and all vertices without faces."""
     count = len(vertices)
     edges = (np.ones(3 * len(faces), dtype=bool), (np.repeat(faces[:, 0], 3), faces[:, 1:].ravel()))
     label = connected_components(sparse.coo_array(edges, shape=(count, count)), directed=False)[1][faces[:, 0]]
     faces = faces[np.bincount(label)[label] >= least] if len(faces) else faces
     used, faces = np.unique(faces, return_inverse=True)
-    return vertices[used], faces.reshape(-1, 4).astype(np.int32)
+    return vertices[used], faces.reshape(-1, 4).astype(np.int32), sizes[used]
 
 
 def _boundary(faces: Ints) -> Ints:
@@ -345,12 +338,12 @@ def _boundary(faces: Ints) -> Ints:
     return np.unique(np.concatenate([lone >> 32, lone & 0xFFFFFFFF]))
 
 
-def _onto(surface: ImplicitSurface, vertices: Floats, ends: Ints, report: Callable[[], None]) -> Floats:
+def _onto(surface: ImplicitSurface, vertices: Floats, ends: Ints, sizes: Floats, report: Callable[[], None]) -> Floats:
     """Move vertices onto the surface, and those at ends of the mesh to the boundary if there is one within a voxel."""
     for _ in range(_ROUNDS):
         there = surface.heights(vertices[ends], report)
-        ahead = np.where(np.abs(there.beyond) < 2.0, there.beyond, 0.0)
+        ahead = np.where(np.abs(there.beyond) < 2.0 * sizes[ends], there.beyond, 0.0)
         vertices[ends] -= ahead[:, None] * there.outward
         there = surface.heights(vertices, report)
-        vertices -= np.clip(there.height, -0.5, 0.5)[:, None] * there.normal
+        vertices -= np.clip(there.height, -0.5 * sizes, 0.5 * sizes)[:, None] * there.normal
     return vertices
