@@ -1,9 +1,12 @@
 """Distances of a cloud from the surface of another one, for the command line and for Blender's tool."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from . import core
 from .alignment import check_found
+from .naming import naming
 from .quantities import COMPARED
 from .settings import Setting
 
@@ -12,6 +15,12 @@ COMPARE = {
     for setting in (
         Setting(
             "align_first", "Move the object onto the other cloud before it is compared, as Align Points does", False
+        ),
+        Setting(
+            "distance",
+            "Along the normal of each point, with a sign; or to the nearest place of the other surface, without one",
+            "NORMAL",
+            choices=("NORMAL", "NEAREST"),
         ),
         Setting(
             "greatest",
@@ -24,49 +33,116 @@ COMPARE = {
 }
 
 
-def compared(points, normals, laplacian, align_first, greatest, names, advice, progress):
+class Sided(NamedTuple):
+    """A surface, and where it is known which side of it is the outer one.
+
+    Attributes
+    ----------
+    laplacian : LaplaceBeltrami
+    orientation : ndarray, (n, 3), or None
+        Vectors to the side that was chosen, zero where none was.
+    """
+
+    laplacian: "core.LaplaceBeltrami"
+    orientation: np.ndarray | None
+
+    def sides(self):
+        """Return 1 where normals point to the outer side, -1 where to the inner one, 0 where nothing tells, (n,)."""
+        sides = core.outer_sides(self.laplacian)
+        if self.orientation is None:
+            return sides
+        chosen = self.orientation.any(axis=1) & (self.laplacian.component >= 0)
+        return np.where(chosen, 1.0, sides)
+
+
+class Compared(NamedTuple):
+    """What a comparison found.
+
+    Attributes
+    ----------
+    found : Deviation
+        Of points that the analysis leaves out nothing is known along normals: they have none.
+    aligned : Alignment or None
+        How the points were moved, if they were.
+    notices : list of str
+        Of both analyses, and of what is in doubt or not compared.
+    """
+
+    found: "core.Deviation"
+    aligned: "core.Alignment | None"
+    notices: list
+
+
+def compared(points, own, other, settings, names, advice, progress):
     """Measure distances of points from the surface of another cloud.
 
     Parameters
     ----------
-    points, normals : ndarray, (n, 3)
+    points : ndarray, (n, 3)
         In the coordinates of the other cloud.
-    laplacian : LaplaceBeltrami
-        Of the other cloud.
-    align_first, greatest
-        Values of the settings in `COMPARE`.
+    own, other : callable
+        Functions of a progress callback that return the `Sided` of both clouds; the first is called for NORMAL only.
+    settings
+        An object with the values of those in `COMPARE` as attributes.
     names : tuple of str
         Of both clouds.
     advice : str
         What to do where they cannot be aligned.
     progress : callable
-        Called as ``progress(stage, fraction)``, from 0.8 on.
+        Called as ``progress(stage, fraction)``.
 
     Returns
     -------
-    Deviation
-    Alignment or None
-        How the points were moved, if they were.
+    Compared
     """
-    aligned = None
-    if align_first:
+    nearest = settings.distance == "NEAREST"
+    surface = None if nearest else own(_share(progress, 0.0, 0.4))
+    with naming(names[1]):
+        target = other(_share(progress, 0.4, 0.4))
+    laplacian, aligned, turn = target.laplacian, None, np.eye(3)
+    if settings.align_first:
         aligned = core.align(points, laplacian.points, progress=lambda stage, _: progress(stage, 0.8))
         check_found(aligned, *names, advice)
-        linear = aligned.matrix[:3, :3]
-        points, normals = points @ linear.T + aligned.matrix[:3, 3], normals @ linear.T
-    found = core.surface_deviation(
-        points,
-        normals,
-        laplacian,
-        greatest or None,
-        progress=lambda stage, fraction: progress(stage, 0.8 + 0.2 * fraction),
-    )
+        turn = aligned.matrix[:3, :3]
+        points = points @ turn.T + aligned.matrix[:3, 3]
+    measure = _share(progress, 0.8, 0.2)
+    notices = [f"{names[1]}: {notice}" for notice in laplacian.notices]
+    if nearest:
+        found, kept = core.surface_deviation(points, None, laplacian, settings.greatest or None, progress=measure), None
+    else:
+        kept = surface.laplacian.component >= 0
+        normals = surface.laplacian.normals[kept] @ turn.T
+        sides = surface.sides()[kept]
+        beyond = core.sides_beside(laplacian, target.sides(), points[kept], normals)
+        normals *= np.where((sides == 0.0) & (beyond != 0.0), beyond, 1.0)[:, None]
+        part = core.surface_deviation(points[kept], normals, laplacian, settings.greatest or None, progress=measure)
+        found = core.Deviation(*(np.zeros(len(points), dtype=values.dtype) for values in part))
+        for whole, values in zip(found, part, strict=True):
+            whole[kept] = values
+        notices = [*surface.laplacian.notices, *notices]
+        notices += _doubtful(np.count_nonzero(part.known & (sides == 0.0) & (beyond == 0.0)), part.known.sum(), names)
     if not found.known.any():
         raise core.PointCloudError(
-            f'No point of "{names[0]}" has the surface of "{names[1]}" above or below it. Move them onto each other,'
-            " or raise Greatest Distance."
+            f'No point of "{names[0]}" has the surface of "{names[1]}" '
+            + ("near it" if nearest else "above or below it")
+            + ". Move them onto each other, or raise Greatest Distance."
         )
-    return found, aligned
+    return Compared(found, aligned, [*notices, *_left_out(found.known, kept, names[1])])
+
+
+def _share(progress, begin, share):
+    return lambda stage, fraction: progress(stage, begin + share * fraction)
+
+
+def _doubtful(count, known, names):
+    """Return a notice of the points whose sign nothing tells, if any."""
+    if not count:
+        return []
+    return [
+        f"The sign is in doubt at {count:,} of {known:,} compared points: neither {names[0]} nor {names[1]} has an"
+        " outer side there, as a closed body or the ground has. Orient Normals by a viewpoint chooses one; Nearest has"
+        " no sign."
+    ]
 
 
 def distances(found):
@@ -81,14 +157,22 @@ def line(found, name, other, length_text) -> str:
     return f"{name}: {mean} from {other} on average, 95 % within {within}, {most} at most"
 
 
-def left_out(found, other) -> list:
-    """Return a notice of the points that are not compared, if any."""
-    left = np.count_nonzero(~found.known)
-    notice = (
-        f"{left:,} of {len(found.known):,} points lie beside the surface of {other}, or too far from it: they are"
-        f" not compared, and {COMPARED} is false there."
-    )
-    return [notice] if left else []
+def _left_out(known, kept, other) -> list:
+    """Return notices of points that are not known, (n,) bool, and of those without normals, which are not kept."""
+    beside, notices = np.count_nonzero(~known), []
+    if kept is not None and not kept.all():
+        strays = np.count_nonzero(~kept)
+        beside -= strays
+        notices.append(
+            f"{strays:,} of {len(known):,} points are outliers or in small components, without a normal: they are not"
+            f" compared, and {COMPARED} is false there."
+        )
+    if beside:
+        notices.append(
+            f"{beside:,} of {len(known):,} points lie beside the surface of {other}, or too far from it: they are not"
+            f" compared, and {COMPARED} is false there."
+        )
+    return notices
 
 
 def figures(found) -> dict:

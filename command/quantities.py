@@ -245,7 +245,8 @@ QUANTITIES = (  # in the order of the panel
     Quantity(
         DEVIATION,
         "Deviation",
-        "Signed distance of each point of a cloud from the surface of another one, along its normal",
+        "Distance of each point of a cloud from the surface of another one, signed along its normal, or to the nearest"
+        " place",
         "compare",
         power=1,
         color_range="symmetric",

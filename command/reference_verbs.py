@@ -9,7 +9,7 @@ import numpy as np
 from . import alignment, clouds, colors, comparison, core, transferring
 from .cloud_verb import CloudVerb, SurfaceVerb, floaters
 from .naming import naming
-from .quantities import COMPARED, TRANSFER, quantity, written_by
+from .quantities import COMPARED, ORIENTATION, TRANSFER, quantity, written_by
 from .results import number_text
 from .settings import LAPLACIAN, chosen
 
@@ -79,29 +79,32 @@ class Compare(ReferenceVerb):
     """The verb `compare`."""
 
     name = operator = "compare"
-    help = "signed distance of points from the surface of those of another file"
+    help = "distance of points from the surface of those of another file, along normals or the nearest one"
     settings = tuple(comparison.COMPARE.values())
     use = "point cloud from whose surface distances are measured"
 
     def work(self, path, given, arguments, output, progress):
         (target, laplacian), reference = self.reference(arguments, progress), Path(arguments.reference)
         cloud, values = clouds.Cloud(path, given, floaters(arguments)), chosen(LAPLACIAN.values(), arguments)
-        normals, shift = self.build(cloud, values, progress).laplacian.normals, cloud.place - target.place
-        names = path.stem, reference.stem
-        own = chosen(self.settings, arguments)
-        found, aligned = comparison.compared(
-            cloud.points + shift, normals, laplacian, **own, names=names, advice="", progress=progress
+        own, shift = SimpleNamespace(**chosen(self.settings, arguments)), cloud.place - target.place
+
+        def build(progress):
+            return comparison.Sided(self.build(cloud, values, progress).laplacian, cloud.columns.get(ORIENTATION))
+
+        other = comparison.Sided(laplacian, target.columns.get(ORIENTATION))
+        names = path.stem, reference.name
+        found, aligned, told = comparison.compared(
+            cloud.points + shift, build, lambda _: other, own, names, "", progress
         )
-        told, written = [*target.notices, *([] if aligned is None else alignment.doubts(aligned))], []
+        told = [*target.notices, *([] if aligned is None else alignment.doubts(aligned)), *told]
         if output is not None:
             moved = given
             if aligned is not None:
                 moved = clouds.moved(given, cloud.points + shift, aligned.matrix, target.place)
             [deviation] = written_by(self.operator)
-            written = clouds.write(output, moved, {deviation: found.distance, COMPARED: found.known})
+            told += clouds.write(output, moved, {deviation: found.distance, COMPARED: found.known})
         line = comparison.line(found, path.stem, reference.name, number_text)
-        figures = {"points": len(cloud.points), "done": line, **comparison.figures(found)}
-        return figures, [*told, *comparison.left_out(found, reference.name), *written]
+        return {"points": len(cloud.points), "done": line, **comparison.figures(found)}, told
 
 
 class TransferAttributes(ReferenceVerb):

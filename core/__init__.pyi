@@ -43,6 +43,8 @@ from .applications.distance.transport import transport as transport
 from .applications.fields import harmonic_field as harmonic_field
 from .applications.fields import solve_poisson as solve_poisson
 from .applications.measuring.deviation import Deviation as Deviation
+from .applications.measuring.deviation import outer_sides as outer_sides
+from .applications.measuring.deviation import sides_beside as sides_beside
 from .applications.measuring.deviation import surface_deviation as surface_deviation
 from .applications.measuring.iso_lines import IsoLine as IsoLine
 from .applications.measuring.iso_lines import iso_lines as iso_lines

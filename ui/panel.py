@@ -153,7 +153,8 @@ def _draw_compared(layout, context, obj):
     hidden = ", which is hidden" if kept.compared_with.hide_get() else ""
     column = layout.column(align=True)
     draw_text(column, context, f"{obj.name} compared with {kept.compared_with.name}{hidden}", "INFO")
-    column.operator("meshfree.compare_swap", text="Swap").greatest = kept.compared_within
+    swap = column.operator("meshfree.compare_swap", text="Swap")
+    swap.greatest, swap.distance = kept.compared_within, "NEAREST" if kept.compared_nearest else "NORMAL"
 
 
 def _draw_followers(layout, context):

@@ -40,7 +40,7 @@ from .nearest import (
     typical_distance,
 )
 from .noise import FILLING, near_misfit
-from .normals import near_edges, side_sums, signs_by_sums, unit_normals
+from .normals import near_edges, side_sums, sides_by_sums, signs_by_sums, unit_normals
 from .orientation import orient_normals, toward
 from .pairs import Pairs
 from .patches import Patch

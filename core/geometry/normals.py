@@ -7,12 +7,13 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components, mini
 
 from ..arguments import as_array, as_doubles
 from ..errors import InvalidPointsError
-from ..types import Array, Floats, Ints
+from ..types import Array, Bools, Floats, Ints
 from .nearest import Nearest
 
 NEIGHBORS = 12
 _BULGING = 0.4  # mean height over the center, along the normals, over the mean distance from it: 0.87 of half a sphere
 _UPRIGHT = 0.5  # difference of a sheet's areas that face up and down, as a share of both, as seen from above
+_LEVEL = 0.2  # mean cosine between a sheet's normals and the vertical from which on up is beyond doubt
 
 
 def unit_normals(normals: ArrayLike, count: int) -> Floats:
@@ -105,13 +106,28 @@ def side_sums(offset: Floats, normals: Floats, part: Ints, weight: Floats) -> Fl
 
 def signs_by_sums(sums: Floats) -> Floats:
     """Return the signs of parts, (parts,), by their `side_sums`: see `outer_signs`."""
+    outward, upward, bulges, sheet = _seen_by_sums(sums)
+    return np.where(np.where(sheet & ~bulges, upward, outward) < 0.0, -1.0, 1.0)
+
+
+def sides_by_sums(sums: Floats) -> Floats:
+    """Return the signs of parts, (parts,), as `signs_by_sums`, but 0 where neither bulge nor slope tells them.
+
+    An open sheet that is upright, such as a facade, has no outer side.
+    """
+    _, upward, bulges, sheet = _seen_by_sums(sums)
+    known = bulges | (sheet & (np.abs(upward) > _LEVEL * sums[:, 0]))
+    return np.where(known, signs_by_sums(sums), 0.0)
+
+
+def _seen_by_sums(sums: Floats) -> tuple[Floats, Floats, Bools, Bools]:
+    """Return how far parts face away from their centers, and up; and whether they bulge, and face up or down."""
     size, first, normal = sums[:, 0] + np.finfo(float).tiny, sums[:, 1:4], sums[:, 4:7]
     outward = sums[:, 7] - np.einsum("ij,ij->i", first, normal) / size
     upward = normal[:, 2]
     spread = sums[:, 8] - np.einsum("ij,ij->i", first, first) / size
     distance = np.sqrt(size * np.maximum(spread, 0.0))
-    sheet = (np.abs(outward) < _BULGING * distance) & (np.abs(upward) > _UPRIGHT * sums[:, 9])
-    return np.where(np.where(sheet, upward, outward) < 0.0, -1.0, 1.0)
+    return outward, upward, np.abs(outward) >= _BULGING * distance, np.abs(upward) > _UPRIGHT * sums[:, 9]
 
 
 def propagate_signs(nearest: Nearest, normals: Floats) -> tuple[Floats, sparse.csr_array]:

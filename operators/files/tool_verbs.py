@@ -174,11 +174,10 @@ class CompareWith(WithReference):
 
     def __init__(self):
         super().__init__("compare", _CompareWithFile)
-        self.help = "signed distance of points from the surface of those of another file"
+        self.help = "distance of points from the surface of those of another file, along normals or the nearest one"
 
     def figures(self, tool, result):
-        found, *_ = result
-        return comparison.figures(found)
+        return comparison.figures(result.compared.found)
 
 
 class AlignWith(WithReference):
@@ -225,7 +224,8 @@ class _CompareWithFile(_MovedLast, Compare):
     reference = None
 
     def other(self, context, obj):
-        return self.reference.name, self.reference.operator, place_of(obj) - self.reference.place, None
+        reference = self.reference
+        return reference.name, reference.reading, reference.operator, place_of(obj) - reference.place, None
 
 
 class _AlignWithFile(_MovedLast, Align):

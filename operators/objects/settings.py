@@ -398,6 +398,11 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     compared_with: PointerProperty(
         type=bpy.types.Object, name="Compared With", description="Object that the last comparison measured from"
     )
+    compared_nearest: BoolProperty(
+        name="Compared by Nearest",
+        description="Whether the last comparison measured the nearest distance",
+        options={"HIDDEN"},
+    )
     compared_within: FloatProperty(
         name="Compared Within",
         description="Greatest distance of the last comparison; 0 for any distance",

@@ -1,11 +1,14 @@
 """Compare two clouds: signed distances of the points of one from the surface of the other."""
 
+from types import SimpleNamespace
+from typing import NamedTuple
+
 import bpy
 import numpy as np
-from bpy.props import BoolProperty, FloatProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
 from ...command.alignment import doubts
-from ...command.comparison import COMPARE, compared, left_out, line
+from ...command.comparison import COMPARE, Compared, Sided, compared, line
 from ...command.naming import naming
 from ...command.quantities import COMPARED, DEVIATION
 from ..objects.attributes import tag_changed, write_attribute
@@ -17,17 +20,33 @@ from ..running.application import ShownOperator, Tool, operator_reader
 from .align import ADVICE, Motion, others
 
 
+class _Result(NamedTuple):
+    """What was measured, from which other cloud, and how the object is moved onto it or None."""
+
+    compared: Compared
+    other: str
+    motion: Motion | None
+
+
 class Compare(Tool):
     """The settings and the work of `meshfree.compare`."""
 
     _move = None  # moves the object, when all else is written
     writes = (DEVIATION, COMPARED)
-    asks = ("align_first", "greatest", "show", "hide_reference")
+    asks = ("align_first", "distance", "greatest", "show", "hide_reference")
     at_zero = {"greatest": "Any"}
 
     align_first: BoolProperty(
         name="Align First",
         **COMPARE["align_first"].keywords,
+    )
+    distance: EnumProperty(
+        name="Distance",
+        items=(
+            ("NORMAL", "Along Normal", "Along the normal of each point: positive on the outer side, negative within"),
+            ("NEAREST", "Nearest", "To the nearest place of the other surface, without a sign"),
+        ),
+        **COMPARE["distance"].keywords,
     )
     greatest: FloatProperty(
         name="Greatest Distance",
@@ -42,30 +61,32 @@ class Compare(Tool):
 
     def plan(self, context, obj):
         reading, operator = operator_reader(context, obj)
-        name, other_operator, shift, other = self.other(context, obj)
-        greatest, own_name = self.greatest, obj.name
-        motion = Motion(obj, shift, other) if self.align_first else None
+        name, other, other_operator, shift, target = self.other(context, obj)
+        names, motion = (obj.name, name), Motion(obj, shift, target) if self.align_first else None
+        settings = SimpleNamespace(distance=self.distance, greatest=self.greatest, align_first=self.align_first)
 
         def compute(progress):
-            normals = operator(lambda stage, fraction: progress(stage, 0.4 * fraction)).normals
-            with naming(name):
-                laplacian = other_operator(lambda stage, fraction: progress(stage, 0.4 + 0.4 * fraction))
-            names = own_name, name
-            found, aligned = compared(
-                reading.points + shift, normals, laplacian, motion is not None, greatest, names, ADVICE, progress
+            found = compared(
+                reading.points + shift,
+                lambda progress: Sided(operator(progress), reading.orientation),
+                lambda progress: Sided(other_operator(progress), other.orientation),
+                settings,
+                names,
+                ADVICE,
+                progress,
             )
-            return found, name, motion, aligned
+            return _Result(found, name, motion)
 
         return compute
 
     def other(self, context, obj):
-        """Return name and operator function of the other cloud, the offset between points as read, and its object."""
+        """Return name, reading and operator function of the other cloud, the offset between points, and its object."""
         other = self.reference_of(context)
         with naming(other.name):
-            _, operator = operator_reader(context, other)
+            reading, operator = operator_reader(context, other)
         # Points are read without the location of their objects.
         shift = np.array(obj.matrix_world.translation) - np.array(other.matrix_world.translation)
-        return other.name, operator, shift, other
+        return other.name, reading, operator, shift, other
 
     @classmethod
     def reference_of(cls, context):
@@ -76,17 +97,18 @@ class Compare(Tool):
         return None if selected else _compared(context)
 
     def write(self, context, obj, result):
-        found, name, motion, aligned = result
+        (found, aligned, notices), name, motion = result
         told, self._move = [], lambda: None
         if aligned is not None:
             self._move = lambda: motion.apply(obj, aligned.matrix)
             told = [f"{obj.name} was moved: {aligned.overlap:.0%} of its points lie on {name}.", *doubts(aligned)]
         obj.meshfree.compared_with = bpy.data.objects.get(name)  # None for a file
         obj.meshfree.compared_within = self.greatest
+        obj.meshfree.compared_nearest = self.distance == "NEAREST"
         write_attribute(obj.data, DEVIATION, found.distance)
         write_attribute(obj.data, COMPARED, found.known)
         tag_changed(obj.data)
-        return [*told, *left_out(found, name), line(found, obj.name, name, length_text)]
+        return [*told, *notices, line(found, obj.name, name, length_text)]
 
 
 class CompareOperator(Compare, ShownOperator):
@@ -116,7 +138,7 @@ class CompareOperator(Compare, ShownOperator):
 
 
 class MESHFREE_OT_compare(CompareOperator, bpy.types.Operator):
-    """Measure the signed distance of the active object's points from the surface of the other selected one"""
+    """Measure the distance of the active object's points from the surface of the other selected one"""
 
     bl_idname = "meshfree.compare"
     bl_label = "Compare Points"

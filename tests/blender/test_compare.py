@@ -59,6 +59,36 @@ def test_points_beside_are_told_of(capfd):
     assert f"{np.count_nonzero(~known):,} of 1,200 points lie beside the surface of Plan" in capfd.readouterr().out
 
 
+def test_nearest_has_no_sign_and_needs_no_normals(spheres, capfd):
+    _, scan = spheres
+    scan.scale = 0.9, 0.9, 0.9
+    bpy.ops.meshfree.compare(distance="NEAREST")
+    assert_allclose(attribute(scan, "lb_deviation"), 0.1, atol=5e-3)
+    bpy.ops.meshfree.compare_swap(greatest=0.0, distance="NEAREST")
+    assert_allclose(attribute(bpy.context.object, "lb_deviation"), 0.1, atol=5e-3)
+    bpy.ops.meshfree.compare()
+    assert_allclose(attribute(bpy.context.object, "lb_deviation"), 0.1, atol=5e-3)
+    assert "sign is in doubt" not in capfd.readouterr().out
+
+
+def test_the_sign_between_two_walls_is_in_doubt_until_a_side_is_chosen(capfd):
+    points, _ = grid_points()
+    wall = np.roll(np.asarray(points), 1, axis=1)
+    _, scan = add_pair(wall, wall + [0.1, 0.0, 0.0])
+    bpy.ops.meshfree.compare()
+    assert "sign is in doubt" in capfd.readouterr().out
+    bpy.ops.object.empty_add(location=(9.0, 0.0, 0.0))
+    viewpoint = bpy.context.object
+    bpy.context.view_layer.objects.active = scan
+    scan.select_set(True)
+    viewpoint.select_set(False)
+    bpy.ops.meshfree.orient_normals(method="VIEWPOINT", viewpoint=viewpoint.name)
+    bpy.ops.meshfree.compare()
+    assert "sign is in doubt" not in capfd.readouterr().out
+    known = attribute(scan, "lb_compared")
+    assert_allclose(attribute(scan, "lb_deviation")[known], 0.1, atol=1e-3)
+
+
 def test_colors_are_about_zero(spheres, extension):
     spheres[1].scale = 1.1, 1.1, 1.1
     bpy.ops.meshfree.compare()

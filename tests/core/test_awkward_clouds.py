@@ -428,6 +428,7 @@ def calls():
     yield core.mesh_surface, on, {"detail": 1.0}
     yield core.values_on_mesh, on, {"vertices": points[:9]}
     yield core.surface_deviation, on, {"points": points[:9], "normals": points[:9], "greatest": 1.0}
+    yield core.sides_beside, on, {"sides": low, "points": points[:9], "normals": points[:9]}
     yield core.deformation_gradients, on, {"positions": points}
     yield core.displace_by_mode, on, {"mode": low, "amplitude": 0.1, "phase": 0.0}
     yield core.segment, {**on, **of}, {"parts": 2}

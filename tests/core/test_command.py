@@ -208,6 +208,74 @@ class TestCompare:
         assert (code, line["compared_count"] < 400) == (0, True)
         assert any("they are not compared" in notice for notice in line["notices"])
 
+    def test_birds_over_the_ground_take_no_part(self, run, tmp_path):
+        rng = np.random.default_rng(7)
+        ground, later = (np.pad(rng.uniform(-5.0, 5.0, (1200, 2)), ((0, 0), (0, 1))) for _ in range(2))
+        birds = np.column_stack([rng.uniform(-4.0, 4.0, (20, 2)), rng.uniform(2.0, 6.0, 20)])
+        plan = write(tmp_path / "plan.ply", ground + FAR)
+        source = write(tmp_path / "a.ply", np.concatenate([later - [0.0, 0.0, 0.05], birds]) + FAR)
+        code, [line] = run("compare", source, "--reference", plan, "--out", tmp_path / "b.ply")
+        assert (code, line["greatest_distance"] < 0.06) == (0, True)
+        found = read_points(tmp_path / "b.ply").attributes
+        assert not found["lb_compared"][1200:].any()
+        known = found["lb_compared"].astype(bool)
+        assert_allclose(found["lb_deviation"][known], -0.05, atol=2e-3)
+        assert any(notice.startswith("20 of 1,220 points are outliers") for notice in line["notices"])
+        code, [line] = run("compare", source, "--reference", plan, "--distance", "nearest", "--out", tmp_path / "b.ply")
+        assert (code, line["compared_count"]) == (0, 1220)
+        found = read_points(tmp_path / "b.ply").attributes["lb_deviation"]
+        assert_allclose(found[1200:], birds[:, 2], rtol=0.02)
+        assert found.min() >= 0.0
+
+    def test_notices_of_both_analyses_are_told(self, run, tmp_path):
+        rough = SPHERE * (1.0 + 0.01 * np.random.default_rng(2).normal(size=(800, 1)))
+        plan, source = (write(tmp_path / f"{name}.ply", rough) for name in ("plan", "a"))
+        _, [line] = run("compare", source, "--reference", plan)
+        told = [notice for notice in line["notices"] if "Noise of" in notice]
+        assert [notice.startswith("plan.ply: ") for notice in told] == [False, True]
+
+    def test_a_sign_in_doubt_is_told_until_a_side_is_chosen(self, run, tmp_path):
+        rng = np.random.default_rng(3)
+        walls = [np.column_stack([np.full(900, x), *rng.uniform(-1.0, 1.0, (2, 900))]) for x in (0.0, 0.1)]
+        plan, source = (write(tmp_path / f"{name}.ply", wall) for name, wall in zip(("plan", "a"), walls, strict=True))
+
+        def compared(source, plan, *more):
+            code, [line] = run("compare", source, "--reference", plan, "--out", tmp_path / "b.ply", *more)
+            assert code == 0, line
+            found = read_points(tmp_path / "b.ply").attributes
+            return found["lb_deviation"][found["lb_compared"] > 0], [
+                n for n in line["notices"] if "sign is in doubt" in n
+            ]
+
+        assert len(compared(source, plan)[1]) == 1
+        assert compared(source, plan, "--distance", "nearest")[1] == []
+        sided = []
+        for number, file in enumerate((source, plan)):
+            sided.append(tmp_path / f"sided_{number}.ply")
+            assert run("orient", file, "--viewpoint", "5,0,0", "--out", sided[-1])[0] == 0
+        for pair in (sided[0], plan), (source, sided[1]), tuple(sided):
+            distance, told = compared(*pair)
+            assert told == []
+            assert_allclose(distance, 0.1, atol=1e-3)
+
+    def test_the_side_of_a_body_counts_where_a_part_has_none(self, run, tmp_path):
+        """A scan of one wall of a room that is known as a whole."""
+        sides = np.insert(square_grid(18)[:, :2] - 0.5, 0, 0.5, axis=1)
+        turns = [np.eye(3), np.diag([-1.0, 1.0, -1.0]), *(np.roll(np.eye(3), k, axis=1) for k in (1, 2))]
+        turns += [np.diag([-1.0, -1.0, -1.0]) @ turn for turn in turns[2:]]
+        plan = write(
+            tmp_path / "plan.ply", np.unique(np.concatenate([sides @ turn for turn in turns]).round(9), axis=0)
+        )
+        wall = np.random.default_rng(8).uniform(-0.3, 0.3, (500, 3))
+        for x in 0.52, 0.47:
+            wall[:, 0] = x
+            code, [line] = run(
+                "compare", write(tmp_path / "a.ply", wall), "--reference", plan, "--out", tmp_path / "b.ply"
+            )
+            assert code == 0, line
+            assert not any("sign" in notice for notice in line["notices"])
+            assert_allclose(read_points(tmp_path / "b.ply").attributes["lb_deviation"], x - 0.5, atol=2e-3)
+
 
 class TestMesh:
     def test_a_closed_surface_with_columns_and_colors(self, run, tmp_path):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 import core
 from benchmarks.samplings import fibonacci_sphere, random_sphere, square_random
@@ -86,3 +87,74 @@ def test_wrong_greatest_distance(operators, greatest):
 def test_normals_that_do_not_fit(operators):
     with pytest.raises(core.InvalidPointsError, match="do not fit 4 points"):
         core.surface_deviation(np.eye(4, 3), np.eye(3), operators("even sphere"))
+
+
+class TestNearest:
+    @pytest.mark.parametrize("radius", [0.05, 0.7, 1.0, 1.3, 3.0, 100.0])
+    def test_spheres(self, operators, radius):
+        laplacian = operators("random sphere")
+        found = core.surface_deviation(radius * random_sphere(500, 77), None, laplacian)
+        assert found.known.all()
+        np.testing.assert_allclose(found.distance, abs(radius - 1.0), atol=0.01 * spacing_of(laplacian))
+
+    def test_a_torus_from_all_around(self, operators):
+        laplacian = operators("random torus")
+        places = np.random.default_rng(3).uniform(-1.5, 1.5, (800, 3))
+        ring = np.hypot(np.hypot(*laplacian.points[:, :2].T) - 1.0, laplacian.points[:, 2]).mean()
+        exact = np.abs(np.hypot(np.hypot(*places[:, :2].T) - 1.0, places[:, 2]) - ring)
+        found = core.surface_deviation(places, None, laplacian)
+        np.testing.assert_allclose(found.distance, exact, atol=0.05 * spacing_of(laplacian))
+
+    def test_where_the_surface_ends_it_is_that_of_the_nearest_point(self, operators):
+        laplacian = operators("square grid")
+        places = np.array([[1.5, 0.5, 0.0], [0.5, -0.4, 0.3], [0.437, 0.512, 0.2]])
+        found = core.surface_deviation(places, None, laplacian)
+        nearest = cKDTree(laplacian.points).query(places)[0]
+        assert np.all(found.distance <= nearest)
+        np.testing.assert_allclose(found.distance, [0.5, 0.5, 0.2], atol=spacing_of(laplacian))
+        assert found.distance[2] == pytest.approx(0.2, abs=1e-6)
+
+    def test_greatest_distance(self, operators):
+        places = [[0.0, 0.0, 1.05], [0.0, 0.0, 1.2]]
+        found = core.surface_deviation(places, None, operators("even sphere"), 0.1)
+        assert found.known.tolist() == [True, False]
+        assert found.distance[1] == 0.0
+
+
+def sheet(count, seed, turn=0.0, noise=0.0):
+    """Return random points of a square of two, turned from level by an angle about its X axis."""
+    rng = np.random.default_rng(seed)
+    x, y = rng.uniform(-1.0, 1.0, (2, count))
+    z = noise * rng.normal(size=count)
+    return np.column_stack([x, np.cos(turn) * y - np.sin(turn) * z, np.sin(turn) * y + np.cos(turn) * z])
+
+
+class TestOuterSides:
+    @pytest.mark.parametrize("name", ["even sphere", "random torus"])
+    def test_bodies_have_one(self, operators, name):
+        laplacian = operators(name)
+        assert np.all(core.outer_sides(laplacian) == 1.0)
+        assert np.all(core.outer_sides(laplacian.toward(-laplacian.normals)) == -1.0)
+
+    @pytest.mark.parametrize(
+        ("degrees", "known"), [(0.0, True), (45.0, True), (70.0, True), (86.0, False), (90.0, False)]
+    )
+    def test_sheets_have_one_if_they_are_not_upright(self, degrees, known):
+        laplacian = core.build_laplacian(sheet(900, 4, np.radians(degrees), 0.001))
+        assert np.all(core.outer_sides(laplacian) == float(known))
+
+    def test_points_left_out_and_those_in_a_volume_have_none(self):
+        points = np.concatenate([random_sphere(1500, 2), [[0.0, 0.0, 2.0]]])
+        laplacian = core.build_laplacian(points)
+        assert laplacian.component[-1] < 0
+        assert core.outer_sides(laplacian)[-1] == 0.0
+        laplacian = core.build_laplacian(np.random.default_rng(5).random((1500, 3)))
+        volume = laplacian.doubt == core.Doubt.VOLUME
+        assert volume.any()
+        assert not core.outer_sides(laplacian)[volume].any()
+
+    def test_beside_a_body(self, operators):
+        laplacian, normals = operators("even sphere"), random_sphere(300, 6)
+        flip = np.where(normals[:, :1] > 0.0, 1.0, -1.0)
+        sides = core.sides_beside(laplacian, core.outer_sides(laplacian), 1.2 * normals, flip * normals)
+        np.testing.assert_array_equal(sides, flip[:, 0])
