@@ -6,7 +6,12 @@ from typing import NamedTuple
 import numpy as np
 
 from . import core
+from .sections import UP
+from .settings import place
 
+OVER = "point cloud over whose surface the volumes of all parts are measured: fill above, and cut below it"
+_VOLUMES = "above", "below", "difference", "difference_uncertainty"  # over a plane or a cloud
+_TOLD = 5  # notices of volumes over a plane that are told
 _LOST = "points are left out of the Laplacian, and not measured"
 
 
@@ -141,3 +146,118 @@ def check_numbers(values, name: str, where: str):
             f"The attribute {name} of {where} has {values.shape[1]} numbers at each point. Choose one with a single"
             " number."
         )
+
+
+class Base(NamedTuple):
+    """What volumes are measured over: a plane, or along its normal the surface of another cloud.
+
+    Attributes
+    ----------
+    point, normal : ndarray, (3,)
+    ground : callable or None
+        Function of a progress callback that returns the operator of the other cloud.
+    shift : ndarray, (3,)
+        From the coordinates of the points to those of the other cloud.
+    name : str
+        Of the other cloud.
+    """
+
+    point: np.ndarray
+    normal: np.ndarray
+    ground: object = None
+    shift: np.ndarray = np.zeros(3)
+    name: str = ""
+
+
+def pile_over(laplacian, chosen, base, measures, progress):
+    """Measure the volume between a part, (n,) bool, and a `Base`, None for the plane through its rim."""
+    if base is None:
+        return core.pile_volume(laplacian, chosen, measures=measures)
+    heights = None
+    if base.ground is not None:
+        rows = np.flatnonzero(chosen & (laplacian.component >= 0))
+        points, normals = laplacian.surface_points[rows] + base.shift, np.broadcast_to(base.normal, (len(rows), 3))
+        found = core.surface_deviation(points, normals, base.ground(progress), progress=progress)
+        heights = np.full(len(chosen), nan)
+        heights[rows] = np.where(found.known, found.distance, nan)
+    return core.pile_volume(laplacian, chosen, plane=(base.point, base.normal), heights=heights, measures=measures)
+
+
+def base_of(plane, normal, place, ground=None, ground_place=None, name=""):
+    """Return the `Base` that options give, None for none.
+
+    Parameters
+    ----------
+    plane, normal : ndarray, (3,), or None
+        A position in the coordinates of the file, and a vector across the plane; else upwards.
+    place : ndarray, (3,)
+        Less which the points are.
+    ground : callable or None
+        See `Base`.
+    ground_place : ndarray, (3,)
+        Less which the points of the other cloud are.
+    name : str
+        Of the other cloud.
+    """
+    if plane is None and ground is None:
+        return None
+    point = np.zeros(3) if plane is None else plane - place
+    shift = np.zeros(3) if ground is None else place - ground_place
+    return Base(point, UP if normal is None else normal, ground, shift, name)
+
+
+def add_base(parser):
+    """Add the options for the plane over which volumes are measured; that for another cloud is `--reference`."""
+    parser.add_argument(
+        "--plane",
+        type=place,
+        metavar="X,Y,Z",
+        help="measure the volume of every part over a plane through this position, in the coordinates of the file",
+    )
+    parser.add_argument(
+        "--normal",
+        type=place,
+        metavar="X,Y,Z",
+        help="vector across the plane, to what counts as above, along which heights over --reference are; else upwards",
+    )
+
+
+def check_base(parser, arguments):
+    """Refuse a normal without what volumes are measured over."""
+    if arguments.normal is not None and arguments.plane is None and not arguments.reference:
+        parser.error("--normal goes with --plane or --reference")
+
+
+def volumes_over(laplacian, rows, labels, base, progress):
+    """Measure the volumes of parts over a `Base`.
+
+    Returns
+    -------
+    list of dict
+        Of each of the rows of a table of parts, by name; empty without a base.
+    list of str
+        Notices, which name the part.
+    """
+    if base is None:
+        return [{} for _ in rows], []
+    measures, volumes, notices, failed = core.SurfaceMeasures(laplacian), [], [], []
+    for row in rows:
+        kind, label = row.name.split()
+        part = (laplacian.component if kind == "Component" else labels) == int(label)
+        try:
+            found = pile_over(laplacian, part, base, measures, progress)
+        except core.InvalidPointsError as error:  # no part of the other cloud is above or below it
+            volumes.append(dict.fromkeys(_VOLUMES))
+            failed.append(error)
+            notices.append(f"{row.name}: {error}")
+            continue
+        numbers = found.above, found.below, found.above - found.below, found.uncertainty
+        volumes.append(dict(zip(_VOLUMES, numbers, strict=True)))
+        notices += [f"{row.name}: {notice}" for notice in found.notices]
+    if len(failed) == len(rows):
+        raise failed[0]
+    more = len(notices) - _TOLD
+    if more > 0:
+        notices[_TOLD:] = [f"There are {more:,} more such notices of parts."]
+    of_ground = [] if base.ground is None else base.ground(progress).notices
+    return volumes, [*(f"{base.name}: {notice}" for notice in of_ground), *notices]

@@ -14,9 +14,9 @@ from .results import number_text
 from .settings import LAPLACIAN, chosen
 
 
-def add_reference(parser, use):
+def add_reference(parser, use, required=True):
     """Add the option for the other file."""
-    parser.add_argument("--reference", required=True, metavar="FILE", help=f"{use}, of the kinds of inputs")
+    parser.add_argument("--reference", required=required, metavar="FILE", help=f"{use}, of the kinds of inputs")
 
 
 class Align(CloudVerb):
@@ -57,11 +57,17 @@ class ReferenceVerb(SurfaceVerb):
 
     reads = ("reference",)
     use = ""  # what the reference is for, for the help
+    required = True  # whether there must be one
     _target = _laplacian = None
 
     def add_options(self, parser):
-        add_reference(parser, self.use)
+        add_reference(parser, self.use, self.required)
         super().add_options(parser)
+
+    @property
+    def read_notices(self) -> list:
+        """What was told as the reference was read, if there is one."""
+        return [] if self._target is None else self._target.notices
 
     def reference(self, arguments, progress):
         """Return the cloud of the reference, and its operator."""

@@ -9,11 +9,21 @@ from .analysis import WRITE_LIMIT
 from .bending import Deform, SplatInfo
 from .cleaning import STRAYS, THIN_OUT, check_some_stay, stray_line, thin_line, thinner
 from .cloud_verb import CloudVerb, SurfaceVerb, floaters
-from .measures import check_labels, check_numbers, measured_line, part_table
+from .measures import (
+    OVER,
+    add_base,
+    base_of,
+    check_base,
+    check_labels,
+    check_numbers,
+    measured_line,
+    part_table,
+    volumes_over,
+)
 from .mesh_verb import Mesh
 from .moving_verbs import MinimalSurface, ModeShape, Smooth
 from .quantities import SEGMENT, STRAY, eigenvector_name, written_by
-from .reference_verbs import Align, Compare, TransferAttributes
+from .reference_verbs import Align, Compare, ReferenceVerb, TransferAttributes
 from .result_verbs import (
     HarmonicField,
     Orient,
@@ -146,7 +156,7 @@ class Analyze(Frames, SurfaceVerb):
         return {**analysis.figures(measures, spectrum), **matched}, [*built.notices, *notices, *written]
 
 
-class Measure(SurfaceVerb):
+class Measure(ReferenceVerb):
     """The verb `measure`, whose outputs are tables."""
 
     name = "measure"
@@ -156,6 +166,15 @@ class Measure(SurfaceVerb):
         Setting("volume", "Measure the volume within closed components, too. It takes longer", True),
         Setting("source", "Numbers at the points whose mean is wanted; empty for the roughness, if there is one", ""),
     )
+    use, required = OVER, False
+
+    def add_options(self, parser):
+        add_base(parser)
+        super().add_options(parser)
+
+    def check(self, parser, arguments):
+        check_base(parser, arguments)
+        super().check(parser, arguments)
 
     def work(self, path, given, arguments, output, progress):
         cloud, own = clouds.Cloud(path, given, floaters(arguments)), SimpleNamespace(**chosen(self.settings, arguments))
@@ -168,10 +187,20 @@ class Measure(SurfaceVerb):
             check_numbers(values, name, str(path))
         laplacian = self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress).laplacian
         rows, notices = part_table(laplacian, labels, values, _volume if own.volume else None, progress)
+        base = base_of(arguments.plane, arguments.normal, cloud.place, *self._ground(arguments, progress))
+        volumes, told = volumes_over(laplacian, rows, labels, base, progress)
+        records = [row.record() | over for row, over in zip(rows, volumes, strict=True)]
         if output is not None:
-            write_rows(output, [row.record() for row in rows])
+            write_rows(output, records)
         line = measured_line(rows, path.stem, number_text)
-        return {"points": len(cloud.points), "done": line, "parts": [row.record() for row in rows]}, notices
+        return {"points": len(cloud.points), "done": line, "parts": records}, [*notices, *self.read_notices, *told]
+
+    def _ground(self, arguments, progress):
+        """Return what `base_of` takes of the other cloud, if there is one."""
+        if arguments.reference is None:
+            return ()
+        target, laplacian = self.reference(arguments, progress)
+        return lambda _: laplacian, target.place, target.path.name
 
 
 def _volume(laplacian, progress):

@@ -130,8 +130,9 @@ def draw_selection(layout, context):
     column.prop(obj.meshfree, "volume_over")
     if obj.meshfree.volume_over == "LEVEL":
         column.prop(obj.meshfree, "volume_height")
-    elif obj.meshfree.volume_over == "OBJECT":
-        column.prop_search(obj.meshfree, "volume_plane", context.scene, "objects", text="Plane")
+    elif obj.meshfree.volume_over in {"OBJECT", "POINTS"}:
+        text = "Plane" if obj.meshfree.volume_over == "OBJECT" else "Points"
+        column.prop_search(obj.meshfree, "volume_plane", context.scene, "objects", text=text)
     if known is None:
         return
     box = layout.box().column(align=True)

@@ -2,45 +2,69 @@
 
 import bpy
 
-from ...command import profiles, sections
+from ...command import measures, profiles, sections
 from ...command.rows import TABLES, write_rows, write_text
 from ...command.settings import as_place
 from ...command.svg import profile_picture
 from ...command.table_verbs import CutOptions, PathOptions
 from ..objects.place import place_of
-from ..tools.measures import MeasureParts
+from ..running.application import operator_reader
+from ..tools.measures import MeasureParts, labels_of
 from ..tools.profile import Profile
 from ..tools.sections import CrossSection
 from . import objects as files
 from . import opening
+from .tool_verbs import WithReference
 from .verbs import LEFT_OUT, Apply
 
 
-class MeasureFile(Apply):
+class MeasureFile(WithReference):
     """The verb `measure`, whose outputs are tables."""
 
     outputs = TABLES
+    use, required = measures.OVER, False
 
     def __init__(self):
         super().__init__("measure_parts", _MeasureInFile)
         self.name = "measure"
 
+    def add_options(self, parser):
+        measures.add_base(parser)
+        super().add_options(parser)
+
+    def check(self, parser, arguments):
+        measures.check_base(parser, arguments)
+        super().check(parser, arguments)
+
+    def prepare(self, tool, obj, path, arguments):
+        other = self._reference
+        ground = () if other is None else (other.operator, other.place, other.name)
+        tool.base = measures.base_of(arguments.plane, arguments.normal, place_of(obj), *ground)
+
     def save(self, tool, obj, output):
-        write_rows(output, [row.record() for row in tool.rows])
+        write_rows(output, tool.records)
         return []
 
     def figures(self, tool, result):
-        return {"parts": [row.record() for row in result.rows]}
+        return {"parts": tool.records}
 
 
 class _MeasureInFile(MeasureParts):
-    """The same tool, which remembers its rows in double precision."""
+    """The same tool, which remembers its rows in double precision, and measures volumes over a plane or a cloud."""
 
-    rows = ()
+    records = ()
+    base = None
 
-    def write(self, context, obj, result):
-        self.rows = result.rows
-        return super().write(context, obj, result)
+    def plan(self, context, obj):
+        measure, (_, operator), labels = super().plan(context, obj), operator_reader(context, obj), labels_of(obj)
+
+        def compute(progress):
+            table = measure(progress)
+            volumes, told = measures.volumes_over(operator(progress), table.rows, labels, self.base, progress)
+            self.records = [row.record() | over for row, over in zip(table.rows, volumes, strict=True)]
+            return table._replace(notices=[*table.notices, *told])
+
+        return compute
 
 
 class Section(CutOptions, Apply):

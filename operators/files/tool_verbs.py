@@ -132,6 +132,7 @@ class WithReference(Apply):
 
     reads = ("reference",)
     use = ""  # what the reference is for, for the help
+    required = True  # whether there must be one
 
     def __init__(self, operator, tool):
         super().__init__(operator, tool)
@@ -139,7 +140,7 @@ class WithReference(Apply):
 
     def add_options(self, parser):
         parser.add_argument(
-            "--reference", type=Path, required=True, metavar="FILE", help=f"{self.use}, of the kinds of inputs"
+            "--reference", type=Path, required=self.required, metavar="FILE", help=f"{self.use}, of the kinds of inputs"
         )
         parser.add_argument(
             "--reference-object",
@@ -150,6 +151,8 @@ class WithReference(Apply):
         super().add_options(parser)
 
     def run(self, path, arguments, output):
+        if arguments.reference is None:
+            return super().run(path, arguments, output)
         if self._reference is None:  # before the input, which replaces it in Blender
             self._reference = self._read(arguments)
         result = super().run(path, arguments, output)

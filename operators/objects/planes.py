@@ -5,6 +5,14 @@ import numpy as np
 from ...core import PointCloudError
 
 
+def object_of(scene, name, meant):
+    """Return the object of a name in a scene; an error says what is meant by it."""
+    found = scene.objects.get(name)
+    if found is None:
+        raise PointCloudError(f'There is no object "{name}" in this scene. Choose one {meant}.')
+    return found
+
+
 def plane_of(scene, name, obj):
     """Return the local XY plane of an object of a scene: a point, from the location of another one on, and a normal.
 
@@ -13,11 +21,7 @@ def plane_of(scene, name, obj):
     PointCloudError
         There is no such object, or it has no plane.
     """
-    found = scene.objects.get(name)
-    if found is None:
-        raise PointCloudError(
-            f'There is no object "{name}" in this scene. Choose one whose local XY plane is meant, such as an empty.'
-        )
+    found = object_of(scene, name, "whose local XY plane is meant, such as an empty")
     matrix = np.array(found.matrix_world, dtype=np.float64)
     normal = np.cross(matrix[:3, 0], matrix[:3, 1])
     if not normal.any():

@@ -312,11 +312,12 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     )
     volume_over: EnumProperty(
         name="Volume Over",
-        description="The plane from which the volume under selected points is measured",
+        description="The plane or surface from which the volume under selected points is measured",
         items=(
             ("RIM", "Rim", "The plane through the rim of the selection, as of a heap on the ground"),
             ("LEVEL", "Height", "The horizontal plane at a height"),
             ("OBJECT", "Object", "The local XY plane of an object, such as an empty"),
+            ("POINTS", "Points", "The surface of another object's points: fill above it and cut below, along Z"),
         ),
         default="RIM",
         update=_measure_again,
@@ -332,7 +333,8 @@ class MESHFREE_PG_settings(bpy.types.PropertyGroup):
     )
     volume_plane: StringProperty(
         name="Plane of Volume",
-        description="Object whose local XY plane volumes are measured from; its Z axis points to what is above",
+        description="Object whose local XY plane volumes are measured from, its Z axis to what is above, or whose"
+        " points",
         update=_measure_again,
     )
     spacing: FloatProperty(

@@ -6,7 +6,7 @@ read only where Blender tells that they may have changed.
 """
 
 import zlib
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from time import perf_counter
 
@@ -25,7 +25,7 @@ from ..objects.result import same_lengths
 from ..registration import Registration, Row
 from ..running.job import Job
 from ..running.ready import TROUBLES, error_text
-from .measuring import Figure, left_out, measured, volume_plane
+from .measuring import Figure, left_out, measured, volume_base
 from .mesh import volume_of
 from .select import SelectionOperator, analyzed, selection
 
@@ -202,8 +202,10 @@ def _look(known, obj):
     """Begin to measure the selection of an object, unless the figures are of it."""
     try:
         _check_unchanged(known, obj)
-        chosen, plane = _selected_now(obj), volume_plane(obj.users_scene[0], obj)
-        seen = zlib.crc32(chosen), repr(plane)
+        chosen, kept = _selected_now(obj), obj.meshfree
+        with _quietly() if kept.volume_over == "POINTS" else nullcontext():  # which reads another object
+            base = volume_base(bpy.context, obj)
+        seen = zlib.crc32(chosen), kept.volume_over, kept.volume_plane, repr(base and base._replace(ground=None))
         if seen == known.seen:
             return
         if not chosen.any():
@@ -215,7 +217,7 @@ def _look(known, obj):
     laplacian, notices = known.laplacian, left_out(known.laplacian, chosen)
 
     def compute(progress):
-        found = measured(laplacian, chosen, plane, progress)
+        found = measured(laplacian, chosen, base, progress)
         return lambda: _show(known, found.figures, [*notices, *found.notices])
 
     _halt(known)

@@ -37,7 +37,7 @@ class MeasureParts(Tool):
 
     def plan(self, context, obj):
         _, operator = operator_reader(context, obj)
-        labels, name, volume = _labels(obj), self.measured(obj), self.volume
+        labels, name, volume = labels_of(obj), self.measured(obj), self.volume
         values = _numbers(obj, name) if name else None
 
         def compute(progress):
@@ -62,7 +62,7 @@ class MESHFREE_OT_measure_parts(MeasureParts, ApplicationOperator, bpy.types.Ope
     bl_label = "Measure Parts"
 
 
-def _labels(obj):
+def labels_of(obj):
     """Read the segments of an object; None without any."""
     if SEGMENT not in obj.data.attributes:
         return None

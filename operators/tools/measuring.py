@@ -7,17 +7,20 @@ import numpy as np
 from bpy.props import BoolProperty, FloatProperty
 
 from ... import core
+from ...command.measures import Base, pile_over
+from ...command.naming import naming
 from ...command.profiles import path_between
+from ...command.sections import UP
 from ...core import PointCloudError
 from ..objects.curves import add_curves
-from ..objects.planes import plane_of
+from ..objects.planes import object_of, plane_of
+from ..objects.reading import obstacle
 from ..objects.result import area_text, length_text, volume_text
 from ..registration import Registration, Row
 from ..running import cache
+from ..running.application import operator_reader
 from .mesh import volume_of
 from .select import SelectionOperator, analyzed, selected
-
-_UP = np.array([0.0, 0.0, 1.0])
 
 
 class Figure(NamedTuple):
@@ -82,8 +85,8 @@ class MESHFREE_OT_measure_selection(SelectionOperator, bpy.types.Operator):
     def prepare(self, context, obj):
         chosen = selected(obj)
         _, laplacian = analyzed(context, obj)
-        plane = volume_plane(context.scene, obj) if self.volume else None
-        found = measured(laplacian, chosen, plane, lambda *_: None)
+        base = volume_base(context, obj) if self.volume else None
+        found = measured(laplacian, chosen, base, lambda *_: None)
         lines, notices = _texts(found), []
         if self.volume:
             whole = volume_of(laplacian, lambda *_: None)
@@ -103,18 +106,30 @@ class MESHFREE_OT_measure_selection(SelectionOperator, bpy.types.Operator):
         return keep
 
 
-def volume_plane(scene, obj):
-    """Return the plane that the settings of an object name, a point and a normal as its points are read, or None."""
-    kept = obj.meshfree
+def volume_base(context, obj):
+    """Return what the settings of an object name to measure volumes over, as its points are read; None for the rim."""
+    kept, location = obj.meshfree, np.array(obj.matrix_world.translation)
     if kept.volume_over == "LEVEL":
-        return np.array([0.0, 0.0, kept.volume_height]) - np.array(obj.matrix_world.translation), _UP
-    return plane_of(scene, kept.volume_plane, obj) if kept.volume_over == "OBJECT" else None
+        return Base(np.array([0.0, 0.0, kept.volume_height]) - location, UP)
+    if kept.volume_over == "OBJECT":
+        return Base(*plane_of(context.scene, kept.volume_plane, obj))
+    if kept.volume_over == "POINTS":
+        other = object_of(context.scene, kept.volume_plane, "whose points are meant")
+        with naming(other.name):
+            if other == obj:
+                raise PointCloudError("Volumes are measured over the points of another object. Choose one.")
+            reason = obstacle(other)
+            if reason:
+                raise PointCloudError(reason)
+            _, ground = operator_reader(context, other)
+        return Base(np.zeros(3), UP, ground, location - np.array(other.matrix_world.translation))
+    return None
 
 
-def measured(laplacian, chosen, plane, progress) -> Measured:
+def measured(laplacian, chosen, base, progress) -> Measured:
     """Measure the points of a part, (n,) bool, at least one of which the operator has.
 
-    `plane` is a point and a normal, or None for the plane through the rim.
+    `base` is what volumes are measured over, None for the plane through the rim.
     """
     whole = cache.result(laplacian, "measures", compute=lambda: core.SurfaceMeasures(laplacian))
     region = cache.result(
@@ -129,13 +144,14 @@ def measured(laplacian, chosen, plane, progress) -> Measured:
     areas, most = laplacian.areas[known], curvature[np.abs(curvature).argmax()]
     piles, notices = (None, None, None), []
     try:
-        pile = core.pile_volume(laplacian, chosen, plane=plane, measures=whole)
+        pile = pile_over(laplacian, chosen, base, whole, progress)
     except core.InvalidPointsError as error:
-        notices = [f"{error} Its volume over the rim was not measured."]
+        notices = [f"{error} Its volume over {'the rim' if base is None else 'that'} was not measured."]
     else:
+        notices = pile.notices
         sides = {"Above the Plane": pile.above, "Below the Plane": pile.below, "Difference": pile.above - pile.below}
         piles = [Figure(title, (volume,), pile.uncertainty, 3) for title, volume in sides.items()]
-        if plane is None:
+        if base is None:
             piles[2] = None
     return Measured(
         Figure("Area", (region.area,), region.area_uncertainty, 2),
@@ -173,7 +189,7 @@ def _pile_text(found, settings):
     if found.net is None:
         return [f"Over the plane of its rim {_within(volume_text, above, off)}, below it {volume_text(below)}"]
     name = f"the height {length_text(settings.volume_height)}"
-    if settings.volume_over == "OBJECT":
+    if settings.volume_over in {"OBJECT", "POINTS"}:
         name = f'"{settings.volume_plane}"'
     difference = _within(volume_text, found.net.values[0], off)
     return [f"Over {name} {volume_text(above)}, below it {volume_text(below)}, the difference {difference}"]

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.blender.clouds import add_object, local_points, sphere_points
+from tests.blender.clouds import add_object, grid_points, local_points, sphere_points
 from tests.blender.conftest import part
 from tests.blender.operators import refused
 
@@ -125,6 +125,22 @@ class TestPlanes:
         bpy.context.view_layer.update()
         assert self.net(cap, '"Ground"') == pytest.approx(-5.0 * np.pi / 3.0, rel=0.02)
 
+    def test_points_of_another_object_where_it_stands(self, cap):
+        ground, _ = grid_points()
+        other = add_object(ground - np.mean(ground, axis=0), "Before")
+        other.location, other.scale = (0.0, 0.0, 2.0), (1.0, 1.5, 1.0)
+        bpy.context.view_layer.objects.active = cap
+        cap.meshfree.volume_over, cap.meshfree.volume_plane = "POINTS", other.name
+        assert self.net(cap, '"Before"') == pytest.approx(5.0 * np.pi / 3.0, rel=0.02)
+        other.location.z = 9.0
+        assert self.net(cap, '"Before"') == pytest.approx(-16.0 * np.pi / 3.0, rel=0.02)
+        other.location.x = 50.0
+        bpy.ops.meshfree.measure_selection(volume=True)
+        assert "has the other surface above or below it" in told(cap)
+        cap.meshfree.volume_plane = cap.name
+        with refused(cap, "Volumes are measured over the points of another object"):
+            bpy.ops.meshfree.measure_selection(volume=True)
+
     def test_no_object_is_refused(self, cap):
         cap.meshfree.volume_over, cap.meshfree.volume_plane = "OBJECT", "Nobody"
         with refused(cap, 'There is no object "Nobody"'):
@@ -233,6 +249,15 @@ class TestLive:
         assert self.shown(live)[0]["Above the Plane"][0] == pytest.approx(5.0 * np.pi / 3.0, rel=0.02)
         live.meshfree.volume_over = "OBJECT"
         assert 'There is no object ""' in self.shown(live)[1][0]
+
+    def test_so_are_points_of_another_object(self, live):
+        points, _ = grid_points()
+        mesh = bpy.data.meshes.new("Before")
+        mesh.from_pydata((points - np.mean(points, axis=0) - [0.0, 0.0, 1.0]).tolist(), [], [])
+        bpy.context.scene.collection.objects.link(bpy.data.objects.new("Before", mesh))
+        live.meshfree.volume_plane = "Before"
+        live.meshfree.volume_over = "POINTS"
+        assert self.shown(live)[0]["Above the Plane"][0] == pytest.approx(5.0 * np.pi / 3.0, rel=0.02)
 
     def test_points_that_are_moved_are_not_measured(self, live):
         bpy.ops.transform.translate(value=(0.0, 0.0, 1.0))

@@ -571,13 +571,14 @@ SAME = {
     "compare": ("--reference", "plan.csv"),
     "section": ("--plane", "0,0,0.2", "--normal", "0,1,1"),
     "profile": ENDS,
-    "measure": (),
+    "measure": ("--plane", "0,0,0.1"),
 }
+OVER_POINTS = "measure", ("--reference", "plan.csv", "--normal", "0,1,0")
 
 
 @pytest.mark.any_blender
-@pytest.mark.parametrize("verb", SAME)
-def test_a_verb_gives_the_same_in_blender_and_without_it(run, command, tmp_path, monkeypatch, capfd, verb):  # noqa: F811
+@pytest.mark.parametrize(("verb", "options"), [*SAME.items(), OVER_POINTS])
+def test_a_verb_gives_the_same_in_blender_and_without_it(run, tmp_path, monkeypatch, capfd, verb, options):  # noqa: F811
     """On points that single precision holds: the record, names and numbers; where signs are free, up to these."""
     monkeypatch.chdir(tmp_path)
     points = (sphere_points(600) * [1.0, 0.9, 0.7]).astype(np.float32).astype(np.float64)
@@ -589,7 +590,7 @@ def test_a_verb_gives_the_same_in_blender_and_without_it(run, command, tmp_path,
     red, green, blue = 0.5 + 0.4 * points.T
     write(tmp_path / "plan.csv", points, r=red, g=green, b=blue, heat=points[:, 0], part=low)
     ending = {"section": "csv", "profile": "csv", "measure": "csv"}.get(verb, "npz")
-    given = [verb, "a.csv", *map(str, SAME[verb]), "--out"]
+    given = [verb, "a.csv", *map(str, options), "--out"]
     code, [inside] = run(*given, f"in.{ending}")
     assert code == 0, inside
     outside_verbs = part("command.verbs").make_verbs()

@@ -134,6 +134,43 @@ class TestMeasure:
         code, [line] = run("measure", source, *(["--source", column] if column == "height" else []))
         assert (code, text in line["error"], str(source) in line["error"]) == (1, True, True)
 
+    def test_volumes_over_a_plane_and_over_another_cloud(self, run, tmp_path):
+        places = np.random.default_rng(1).uniform(-1.6, 1.6, (2, 2500, 2))
+        heap, ground = (np.column_stack([xy, 0.0 * xy[:, 0]]) for xy in places)
+        heap[:, 2] = np.maximum(0.5 * (1.0 - np.hypot(*heap[:, :2].T)), 0.0)
+        far = FAR + [7.0, 0.0, 0.0]
+        source, plan = write(tmp_path / "a.ply", heap + FAR), write(tmp_path / "plan.ply", ground * 1.1 + FAR)
+        plane = f"--plane={','.join(map(repr, np.asarray(FAR, dtype=float).tolist()))}"
+        for base in ([plane], ["--reference", plan]):
+            code, [line] = run("measure", source, *base, "--no-volume", "--out", tmp_path / "b.csv")
+            assert code == 0, line
+            [row] = line["parts"]
+            assert row["above"] == pytest.approx(np.pi / 6.0, rel=0.03)
+            assert row["difference"] == row["above"] - row["below"]
+            assert 0.0 < row["difference_uncertainty"] < 0.05 * row["above"]
+            assert row["below"] < 0.01
+            head, values = (tmp_path / "b.csv").read_text().splitlines()[:2]
+            assert dict(zip(head.split(","), values.split(","), strict=True))["above"] == repr(row["above"])
+        code, [line] = run("measure", source, plane, "--normal=0,0,-1", "--no-volume")
+        assert (code, line["parts"][0]["below"]) == (0, pytest.approx(np.pi / 6.0, rel=0.03))
+        assert "above" not in run("measure", source, "--no-volume")[1][0]["parts"][0]
+        away = write(tmp_path / "away.ply", ground + far)
+        code, [line] = run("measure", source, "--reference", away, "--no-volume")
+        assert (code, "has the other surface above or below it" in line["error"]) == (1, True)
+        assert run("measure", source, "--normal=0,0,1")[0] == 2
+        both = write(tmp_path / "both.ply", np.concatenate([heap, heap[::2] + [9.0, 0.0, 0.0]]) + FAR)
+        code, [line] = run("measure", both, "--reference", plan, "--no-volume")
+        assert [part["above"] is None for part in line["parts"]] == [False, True]
+        assert any(notice.startswith("Component 1: None of the ") for notice in line["notices"])
+
+    def test_a_missing_piece_of_a_heap_is_told(self, run, tmp_path):
+        xy = np.random.default_rng(1).uniform(-1.6, 1.6, (2500, 2))
+        heap = np.column_stack([xy, np.maximum(0.5 * (1.0 - np.hypot(*xy.T)), 0.0)])
+        source = write(tmp_path / "a.ply", heap[~(xy > 0.0).all(axis=1)])
+        code, [line] = run("measure", source, "--plane=0,0,0", "--no-volume")
+        assert code == 0, line
+        assert any(notice.startswith("Component 0: The surface ends within") for notice in line["notices"])
+
 
 class TestAlign:
     def test_points_normals_and_scanner_move_to_the_reference(self, run, tmp_path):

@@ -80,3 +80,86 @@ def test_what_is_measured_against_a_plane_follows_rotation_and_scale(operators):
 def test_what_is_no_plane_or_no_part_is_refused(operators, members, plane, text):
     with pytest.raises(core.InvalidPointsError, match=text):
         core.pile_volume(operators("even sphere"), np.array(members, dtype=int), plane=plane)
+
+
+def heap(count, half=1.6, seed=2):
+    """Return random points of a cone of radius 1 and height 0.5 on the ground: its volume is pi / 6."""
+    places = np.random.default_rng(seed).uniform(-half, half, (count, 2))
+    return np.column_stack([places, np.maximum(0.5 * (1.0 - np.hypot(*places.T)), 0.0)])
+
+
+class TestMissingPieces:
+    @pytest.mark.parametrize("count", [1500, 7000])
+    @pytest.mark.parametrize("plane", [None, ([0.0, 0.0, 0.0], [0.0, 0.0, 1.0])])
+    @pytest.mark.parametrize("scale", [1.0, 1000.0])
+    def test_a_quadrant_is_told_unless_its_volume_is_known(self, count, plane, scale):
+        """In few points a hole may be as wide as gaps between them: areas around it fill it."""
+        points = heap(count)
+        far = np.hypot(*points[:, :2].T)
+        quadrant = (points[:, :2] > 0.0).all(axis=1)
+        for missing in quadrant & (far < 1.0), quadrant:
+            laplacian = core.build_laplacian(scale * points[~missing])
+            found = core.pile_volume(laplacian, far[~missing] < 1.05, plane=plane)
+            known = abs(found.above - found.below - scale**3 * np.pi / 6.0) < found.uncertainty
+            told = [notice.startswith("The surface ends within the part along ") for notice in found.notices]
+            assert told == [True] or (known and count < 2000)
+
+    @pytest.mark.parametrize("count", [1500, 7000])
+    @pytest.mark.parametrize("plane", [None, ([0.0, 0.0, 0.0], [0.0, 0.0, 1.0])])
+    def test_whole_heaps_are_not_told_of_with_ground_and_without(self, count, plane):
+        points = heap(count)
+        far = np.hypot(*points[:, :2].T)
+        for kept in far < 9.0, far < 1.0:
+            found = core.pile_volume(core.build_laplacian(points[kept]), far[kept] < 1.05, plane=plane)
+            assert found.notices == []
+            assert found.above - found.below == pytest.approx(np.pi / 6.0, rel=0.02, abs=found.uncertainty)
+
+
+class TestHeights:
+    up = ([0.0, 0.0, 0.0], [0.0, 0.0, 1.0])
+
+    def over(self, points, ground):
+        laplacian = core.build_laplacian(points)
+        normals = np.tile(self.up[1], (len(points), 1))
+        found = core.surface_deviation(laplacian.surface_points, normals, core.build_laplacian(ground))
+        return laplacian, np.where(found.known, found.distance, np.nan)
+
+    def test_fill_and_cut_between_two_surveys(self):
+        """A heap that was put beside a pit of the same form, on ground that slopes."""
+        before, after = heap(6000, 3.0, 1), heap(6000, 3.0, 5)
+        for points, sign, x in (before, -1.0, 1.2), (after, 1.0, -1.2):
+            high = np.maximum(0.5 * (1.0 - np.hypot(points[:, 0] - x, points[:, 1])), 0.0)
+            points[:, 2] = sign * high + 0.2 * points[:, 0] + 0.1 * points[:, 1]
+        laplacian, heights = self.over(after, before)
+        found = core.pile_volume(laplacian, np.ones(6000, dtype=bool), plane=self.up, heights=heights)
+        assert found.above == pytest.approx(np.pi / 3.0, rel=0.03)
+        assert found.below < 0.01
+        laplacian, heights = self.over(before, after)
+        found = core.pile_volume(laplacian, np.ones(6000, dtype=bool), plane=self.up, heights=heights)
+        assert found.below == pytest.approx(np.pi / 3.0, rel=0.03)
+        assert found.above < 0.01
+
+    def test_over_a_flat_cloud_it_is_that_over_a_plane(self):
+        points = heap(3000)
+        laplacian, heights = self.over(points, heap(3000, 2.0, 9) * [1.0, 1.0, 0.0])
+        within = np.hypot(*points[:, :2].T) < 1.2
+        one = core.pile_volume(laplacian, within, plane=self.up)
+        other = core.pile_volume(laplacian, within, plane=self.up, heights=heights)
+        assert [other.above, other.below] == pytest.approx([one.above, one.below], abs=1e-6)
+
+    def test_what_has_nothing_below_is_told(self):
+        points = heap(3000)
+        laplacian, heights = self.over(points, (heap(3000, 2.0, 9) + [2.0, 0.0, 0.0]) * [1.0, 1.0, 0.0])
+        found = core.pile_volume(laplacian, np.ones(3000, dtype=bool), plane=self.up, heights=heights)
+        assert found.above == pytest.approx(np.pi / 12.0, rel=0.05)
+        assert any("have nothing of the other surface above or below" in notice for notice in found.notices)
+        with pytest.raises(core.InvalidPointsError, match="None of the 3000 points"):
+            core.pile_volume(laplacian, np.ones(3000, dtype=bool), plane=self.up, heights=np.full(3000, np.nan))
+
+    def test_heights_that_cannot_be_used_are_refused(self, operators):
+        laplacian = operators("even sphere")
+        cap = laplacian.points[:, 2] > 0.5
+        with pytest.raises(core.InvalidPointsError, match="no plane whose normal they are along"):
+            core.pile_volume(laplacian, cap, heights=np.zeros(2500))
+        with pytest.raises(core.InvalidPointsError, match="one real number for each of 2500 points"):
+            core.pile_volume(laplacian, cap, plane=self.up, heights=np.zeros(3))
