@@ -16,9 +16,7 @@ from ...types import Bools, Floats, Ints
 from .regions import STRIP, SurfaceMeasures
 from .volume import NOISE
 
-_OPEN = (
-    0.05  # of the volume: what a strip as wide as the part, beyond where the surface ends, would add till it is told
-)
+_OPEN = 0.05  # of the volume: what a strip as wide as the part, beyond where the surface ends, adds at most untold
 _NEAR = 7  # nearest points, the point itself among them, of which one is beyond the rim
 
 
