@@ -47,6 +47,7 @@ from .patches import Patch
 from .points import FEWEST, ScaledPoints, as_indices, as_mask, check_points, check_values, scale_points
 from .prolongation import Prolongation, balanced_weights
 from .quadrics import CURVED, MANY, check_surface, count_curves, frames, roundness
+from .rounding import find_rounding, smooth_rounded
 from .rows import look_across_rows
 from .sheets import choose_bridges, join_touching, sheet_neighbors
 from .strays import PARTS, label_parts, stray_scores, without

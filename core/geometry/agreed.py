@@ -30,6 +30,9 @@ class Agreed:
         Origin of scaled coordinates [L].
     scale : float, optional
         Their unit, the root mean square radius [L].
+    rounded : ndarray, (3,), optional
+        Along the direction in which points are rounded in steps, as long as these, as a share of the spacing; zero
+        where they are not.
     spacing : float, optional
         Median distance between points, scaled: beyond some of it points are sparse.
     reach : float, optional
@@ -74,6 +77,7 @@ class Agreed:
 
     center: Floats | None = None
     scale: float | None = None
+    rounded: Floats | None = None
     spacing: float | None = None
     reach: float | None = None
     component: Ints | None = None

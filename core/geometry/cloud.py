@@ -26,6 +26,7 @@ from .outliers import find_outliers
 from .pairs import Pairs, find_pairs
 from .points import ScaledPoints, as_mask, check_boundary, check_distances, check_points, scale_points
 from .quadrics import MANY, Quadrics, check_surface, count_curves, frames
+from .rounding import smooth_rounded
 from .rows import look_across_rows
 from .sheets import Sheets, fit_sheets, label_sheets, separate_sheets
 from .winding import orient_by_winding
@@ -50,6 +51,9 @@ class Sample:
         Noise that was smoothed at each point, as a share of the spacing; zero where none was.
     scatter : ndarray, (2, m)
         What quadrics missed the neighbours of each point by before that, see `likely_causes`; zero until it is known.
+    step : float
+        Distance from level to level where depth is rounded so coarsely that this was smoothed, as a share of the
+        spacing; zero elsewhere.
     decisions : Decisions
         What is decided for the points as a whole.
     """
@@ -59,6 +63,7 @@ class Sample:
     nearest: Nearest
     noise: Floats
     scatter: Floats
+    step: float = 0.0
     decisions: Decisions = field(default_factory=Decisions)
 
     @property
@@ -281,6 +286,7 @@ def measure_surface(
             left_out=counts[1] - len(own),
             share=1.0 - len(own) / counts[1],
             noise=sample.noise,
+            step=sample.step,
             narrow=bool(np.mean(lengths > _NARROW * depth(nearest, edge.distance)) > MANY),
         ),
     )
@@ -323,8 +329,10 @@ def read_surface(
 
 def gather(scaled: ScaledPoints, decisions: Decisions) -> Sample:
     """Find the neighbours of all distinct points."""
-    count, nearest = len(scaled.points), look_across_rows(find_nearest(scaled.points))
-    return Sample(scaled, np.zeros(count, dtype=int), nearest, np.zeros(count), np.zeros((2, count)), decisions)
+    count = len(scaled.points)
+    smoothed = smooth_rounded(find_nearest(scaled.points), functools.partial(decisions.settle, "rounded"))
+    nearest, noise = look_across_rows(smoothed.nearest), smoothed.noise
+    return Sample(scaled, np.zeros(count, dtype=int), nearest, noise, np.zeros((2, count)), smoothed.step, decisions)
 
 
 def leave_outliers(
@@ -446,7 +454,8 @@ def remove_noise(surface: Surface, options: LaplacianOptions, near: Floats | Non
         # What does not fall so fast is no noise, such as leaves.
         noisy &= (left > LEFT) & (left < FALLING * before)
         before = left
-    return replace(surface, sample=replace(surface.sample, noise=first))
+    noise = np.maximum(surface.sample.noise, first)
+    return replace(surface, sample=replace(surface.sample, noise=noise))
 
 
 def measure_noise(surface: Surface, near: Floats) -> Floats:
@@ -579,16 +588,19 @@ def locate_boundary(
     return measured if distance is None else measured.with_nearest(distance, nearest.spacing)
 
 
-def _notices(duplicates: int, left_out: int, share: float, noise: Floats, narrow: bool) -> list[str]:
+def _notices(duplicates: int, left_out: int, share: float, noise: Floats, step: float, narrow: bool) -> list[str]:
     """Return texts on what was merged, smoothed and left out."""
     noisy, filling = np.mean(noise > 0.0), np.mean(noise > FILLING)
-    level = noise.mean() / max(noisy, 1e-300)
+    level, rounded = noise.mean() / max(noisy, 1e-300), step > 0.0
     texts = {
         f"Points that lie on another one: {duplicates}. They share one area.": duplicates,
+        f"Depth is rounded in steps of {step:.2g} of the spacing: {level:.2f} of the spacing was smoothed within the"
+        f" operator, at {noisy:.0%} of the points, and details of a few spacings with it.": rounded,
         f"Noise of {level:.2f} of the spacing was smoothed within the operator, at {noisy:.0%} of the points.": noisy
-        > filling,
+        > filling
+        and not rounded,
         f"Noise of more than half the spacing, at {filling:.0%} of the points, was smoothed within the operator, and"
-        " details with it: areas may be off by 10 % and more. Use more exact points.": filling > MANY,
+        " details with it: areas may be off by 10 % and more. Use more exact points.": filling > MANY and not rounded,
         f"Outliers and small components left out of the operator: {left_out} ({100.0 * share:.2g} %).": left_out,
         "Part of the surface is so narrow that the kernel covers several of its sides: areas there may be off by 10 %"
         " and more. Add points.": narrow,

@@ -13,7 +13,7 @@ _LEAST = 0.02  # noise below this share of the spacing is left alone
 LEFT = 0.08  # of the spacing: scatter about a fit that counts as none; it shrinks with the root of its neighbours
 FILLING = 0.4  # noise above this share fills the neighbourhoods as a volume would
 FALLING = 0.9  # share of noise that a round leaves, at most: .3 of one spacing, .86 of three, all of leaves in a volume
-_LARGEST = 90  # neighbours of the fit that points are projected on, at most: more would round the shape
+LARGEST = 90  # neighbours of the fit that points are projected on, at most: more would round the shape
 _BLOCK = 1 << 12  # points projected at one time
 
 
@@ -89,7 +89,7 @@ def project_points(tree: cKDTree, rows: Ints, noise: Floats, smallest: int | Non
     """
     smallest = tree.n if smallest is None else min(smallest, tree.n)
     # A quadric has six coefficients.
-    asked = np.clip(6.0 * (noise[rows] / LEFT) ** 2, ENOUGH, _LARGEST)
+    asked = np.clip(6.0 * (noise[rows] / LEFT) ** 2, ENOUGH, LARGEST)
     many = np.minimum(asked.astype(int), smallest - 1)
     order = np.argsort(many, kind="stable")  # those who ask for few neighbours do not wait for others' many
     result = np.empty((len(rows), 3))

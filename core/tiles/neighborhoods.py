@@ -6,12 +6,14 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..geometry import (
     COUNT,
     FILLING,
     MANY,
     Sample,
+    ScaledPoints,
     Surface,
     check_points,
     check_surface,
@@ -21,6 +23,7 @@ from ..geometry import (
     divide_sheets,
     drop_outliers,
     find_gaps,
+    find_rounding,
     fit_surface,
     gap_reach,
     gather,
@@ -53,11 +56,27 @@ class Fitted(NamedTuple):
     near: Floats | None = None
 
 
-def find_spacing(site: Site, state: Any) -> tuple[Sample, Told]:
-    """Find the neighbours of the points of a tile."""
+def look_for_rounding(site: Site, state: Any) -> tuple[ScaledPoints, Told]:
+    """Look whether the points of a tile are rounded in steps, and along which direction."""
     points = check_points(site.part.points)
     check_memory(len(points), site.options)
     scaled = scale_points(points, site.needed, site.decisions())
+    rounding, count = find_rounding(cKDTree(scaled.points)), np.count_nonzero(site.inner(scaled))
+    return scaled, {"count": np.array(count), "squares": count * np.outer(rounding, rounding)}
+
+
+def agree_on_rounding(shelf: Shelf, options: LaplacianOptions) -> Record:
+    """Agree on the direction along which most points are rounded in steps, and on these; zero where most are not."""
+    found = np.array([np.trace(squares) > 0.0 for squares in shelf.told("rounding", "squares")])
+    count = np.array(list(shelf.told("rounding", "count")))
+    if count[found].sum() <= 0.5 * count.sum():
+        return {"rounded": np.zeros(3)}
+    square, axes = np.linalg.eigh(sum(shelf.told("rounding", "squares")) / count[found].sum())
+    return {"rounded": np.sqrt(square[2]) * axes[:, 2]}
+
+
+def find_spacing(site: Site, scaled: ScaledPoints) -> tuple[Sample, Told]:
+    """Find the neighbors of the points of a tile."""
     sample = gather(scaled, site.decisions())
     inner = site.inner(scaled)
     return sample, {"spacing": sample.nearest.spacing[inner], "distinct": np.array(len(scaled.points))}
@@ -156,7 +175,7 @@ def find_filling(site: Site, state: object) -> tuple[None, Told]:
     """Follow how points that fill volumes fare as noise is smoothed, around the one next to the middle of all."""
     around = points_around(site.shelf, site.record["filled"], _FILLED, "fills")
     trial = Site(site.shelf, -1, site.options, around)
-    sample, _ = find_spacing(trial, None)
+    sample, _ = find_spacing(trial, look_for_rounding(trial, None)[0])
     left, _ = find_reach(trial, sample)
     fitted, _ = find_noise(trial, left or sample)
     found = remove_noise(_with_decisions(trial, fitted.surface), site.options, fitted.near)

@@ -84,7 +84,7 @@ class Site:
         """Return what is agreed on for the points here."""
         record = self.record
         known: dict[str, Any] = {name: float(record[name]) for name in _SCALARS if name in record}
-        known |= {name: record[name] for name in ("center", "ratio") if name in record}
+        known |= {name: record[name] for name in ("center", "ratio", "rounded") if name in record}
         known |= {name: self.named(step, name) for name, step in _LABELS.items() if name in record}
         if "smallest" in record:
             known["smallest"] = int(record["smallest"])

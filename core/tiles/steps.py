@@ -77,6 +77,7 @@ class Step:
 
 
 _SURVEY = (
+    Step("rounding", "Neighbors", 0.5, neighborhoods.look_for_rounding, neighborhoods.agree_on_rounding),
     Step("spacing", "Neighbors", 8.6, neighborhoods.find_spacing, neighborhoods.agree_on_spacing),
     Step("reach", "Outliers", 1.1, neighborhoods.find_reach, neighborhoods.agree_on_reach),
     Step("gaps", "Components", 1.5, neighborhoods.link_strictly, neighborhoods.agree_on_large),

@@ -59,7 +59,7 @@ def test_the_boundary_of_a_square(operators):
     found = core.measure_parts(operators("square grid"))
     laplacian = operators("square grid")
     side = np.ptp(laplacian.points[:, 0])
-    assert abs(found.areas[0] - side**2) < found.area_uncertainties[0] < 0.05 * side**2
+    assert abs(found.areas[0] - side**2) < found.area_uncertainties[0] < 0.08 * side**2
     assert abs(found.boundary_lengths[0] - 4.0 * side) < found.length_uncertainties[0]
 
 
@@ -122,3 +122,16 @@ def test_it_can_be_cancelled(spheres):
 
     with pytest.raises(core.Cancelled):
         core.measure_parts(spheres, (spheres.points[:, 2] > 0.0).astype(int), progress=stop)
+
+
+@pytest.mark.parametrize("offset", [0.02, 0.3, 0.5, 0.7, 0.98])
+@pytest.mark.parametrize("turned", [0.0, 1.0, 10.0])
+def test_areas_of_sheets_on_grids_are_within_their_uncertainty(offset, turned):
+    """How far beyond the last row of pixels a sheet goes on, nobody knows."""
+    grid = np.stack(np.meshgrid(np.arange(-40.0, 40.0), np.arange(-40.0, 40.0)), axis=-1).reshape(-1, 2)
+    angle = np.radians(turned)
+    grid = grid @ np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    size = np.array([20.0, 15.0]) + offset
+    inside = grid[(np.abs(grid) < size).all(axis=1)]
+    parts = core.measure_parts(core.build_laplacian(np.column_stack([inside, np.zeros(len(inside))])))
+    assert abs(parts.areas[0] - 4.0 * size.prod()) <= parts.area_uncertainties[0]

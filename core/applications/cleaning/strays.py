@@ -12,6 +12,7 @@ from ...geometry import (
     label_parts,
     look_across_rows,
     scale_points,
+    smooth_rounded,
     stray_scores,
     without,
 )
@@ -66,7 +67,7 @@ class Strays:
         report = progress or (lambda stage, fraction: None)
         report("Neighbors", 0.0)
         scaled = scale_points(check_points(points), _NEEDED)
-        nearest = look_across_rows(find_nearest(scaled.points))
+        nearest = look_across_rows(smooth_rounded(find_nearest(scaled.points)).nearest)
         report("Strays", 0.3)
         scores = stray_scores(nearest, lambda: report("Strays", 0.3))
         report("Parts", 0.9)

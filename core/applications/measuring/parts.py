@@ -11,7 +11,7 @@ from ...arguments import check_array
 from ...errors import InvalidPointsError
 from ...operator import LaplaceBeltrami
 from ...types import Bools, Floats, Ints, Progress
-from .regions import LENGTH_OFF, STRIP, SurfaceMeasures, measure_region
+from .regions import LENGTH_OFF, SurfaceMeasures, measure_region
 
 
 @dataclass(frozen=True)
@@ -72,8 +72,9 @@ def measure_parts(
     -----
     The area of whole components is the sum of their area elements; of other parts it is that of `measure_region`. Its
     uncertainty adds up what the missed moments of the kernel leave, by the trust in each point, what noise that was
-    smoothed leaves, by its height and the curvature, and in which strip the boundary of the surface is; the line
-    between parts counts as of `measure_region`, by its square. The weights were fitted to random points on spheres,
+    smoothed leaves, by its height and the curvature, and in which strip the boundary of the surface is: where rows of
+    points run along it, such as pixels, up to where the next row would be. The line between parts counts as of
+    `measure_region`, by its square. The weights were fitted to random points on spheres,
     tori, discs, cylinders and boxes with noise of up to 0.3 spacings.
 
     Examples
@@ -91,7 +92,7 @@ def measure_parts(
     parts = _Labelled(laplacian, labels)
     whole = SurfaceMeasures(laplacian)
     areas, lengths = parts.sums(whole.areas), parts.sums(whole.boundary_lengths)
-    doubt = parts.sums(whole.area_doubts) + STRIP * np.abs(parts.sums(whole.spacing * whole.boundary_lengths))
+    doubt = parts.sums(whole.area_doubts) + np.abs(parts.sums(whole.boundary_doubts))
     doubt_of_lengths = LENGTH_OFF[1] * np.abs(lengths)
     divided = np.flatnonzero(parts.divided())
     for done, part in enumerate(divided):

@@ -13,7 +13,7 @@ from ...errors import InvalidPointsError
 from ...geometry import as_mask
 from ...operator import LaplaceBeltrami
 from ...types import Bools, Floats, Ints
-from .regions import STRIP, SurfaceMeasures
+from .regions import SurfaceMeasures
 from .volume import NOISE
 
 _OPEN = 0.05  # of the volume: what a strip as wide as the part, beyond where the surface ends, adds at most untold
@@ -208,7 +208,7 @@ def _doubt(whole: SurfaceMeasures, chosen: Bools, rim: Ints, high: Floats, facin
     """
     laplacian, spacing = whole.laplacian, whole.spacing
     noise = NOISE * np.linalg.norm(laplacian.surface_points - laplacian.points, axis=1)
-    systematic = whole.area_doubts * high + STRIP * spacing * np.abs(whole.boundary_lengths) * high
+    systematic = whole.area_doubts * high + np.abs(whole.boundary_doubts) * high
     systematic += whole.areas * noise * facing
     edge = float(np.sqrt(0.5 * np.sum((high[rim] * spacing[rim] ** 2) ** 2)))
     return float(np.hypot(edge, systematic[chosen].sum()))

@@ -15,7 +15,7 @@ from scipy.special import erfinv, expit
 from ...algebra import blocks
 from ...arguments import as_array, check_array, check_finite
 from ...errors import InvalidPointsError
-from ...geometry import SMOOTH, as_mask, move_apart
+from ...geometry import FEW, SMOOTH, as_mask, move_apart
 from ...operator import LaplaceBeltrami
 from ...types import Bools, Floats, Ints, Progress
 from ..graph import mean_spacing
@@ -42,7 +42,9 @@ _VARIANCE = 1.0 / 7.0  # of the derivative of the step
 _MOMENTS = 0.1  # share of an area that may be wrong where trust is a half
 _ROUGH = 0.04  # of the height of noise, over the spacing: what it adds to areas
 _ROUNDED = 6.0  # of noise times spacing times the squared mean curvature: what smoothing it takes from edges
-STRIP = 0.2  # of the spacing, along the boundary of the surface: where that is
+# Of the spacing: how well it is known where the surface ends, at best and where rows run along its boundary, and by how
+# much better for each spacing that points there are off the boundary.
+_STRIP_WIDTH = 0.2, 1.1, 2.2
 _AREA_OFF = 1.0  # of the area of a square of one spacing: what each such piece of the line leaves open, two deviations
 LENGTH_OFF = 0.005, 0.05  # of the length of the line, and of the boundary of the surface
 _LENGTH_BENT = 0.3  # of the length, times the squared curvature of the surface over a spacing: what is off more
@@ -100,6 +102,9 @@ class SurfaceMeasures:
         By how much the area of each point may be wrong [L^2].
     boundary_lengths : ndarray, (n,)
         Length of the surface's own boundary next to each point [L].
+    boundary_doubts : ndarray, (n,)
+        By how much the area along that may be wrong, as it is not known where between points and none the surface ends
+        [L^2]; to be added up with their signs.
 
     See Also
     --------
@@ -126,6 +131,7 @@ class SurfaceMeasures:
         self.spacing = mean_spacing(laplacian)
         self.area_doubts = _area_doubts(laplacian, self.spacing)
         self.boundary_lengths = _boundary_lengths(self.areas, laplacian.boundary_distance, self.spacing)
+        self.boundary_doubts = self.boundary_lengths * self.spacing * _strips(laplacian, self.spacing)
         # The heat of a point flows to its neighbours at twice this rate at most.
         self.rates = np.where(known, laplacian.stiffness.diagonal() / laplacian.areas, 0.0)
         self._places = laplacian.surface_points - laplacian.surface_points[known].mean(axis=0)
@@ -254,7 +260,7 @@ def measure_region(
     fine = np.clip((_TURNS[1] - turn) / (_TURNS[1] - _TURNS[0]), 0.0, 1.0) if np.all(share % 1.0 == 0.0) else 0.0
     area = fine * smooth + (1.0 - fine) * plain
     owned = whole.boundary_lengths * step
-    own, doubt = float(owned.sum()), float(share @ whole.area_doubts + STRIP * abs(spacing @ owned))
+    own, doubt = float(owned.sum()), float(share @ whole.area_doubts + abs(whole.boundary_doubts @ step))
     weight = areas * (fine * step + (1.0 - fine) * share)
     squared = max(float(areas[near] @ (slope * spacing[near] ** 3)), float(np.sum(line.lost**4)) / (2.0 * _STRIP))
     bend = np.minimum(np.linalg.norm(laplacian.shape_operator[near], axis=(1, 2)) * spacing[near], 1.0)
@@ -334,6 +340,24 @@ def _second(x: Floats) -> Floats:
 def _edge(x: Floats) -> Floats:
     """Return a kernel that falls smoothly from 0 to 1, with the integral 1 there."""
     return 2.0 * _slope(np.maximum(x, 0.0))
+
+
+def _strips(laplacian: LaplaceBeltrami, spacing: Floats) -> Floats:
+    """Return how wide a strip, in spacings, at the boundary of the surface may be missing or too much, (n,).
+
+    Points at random or in rows across the boundary lie off it by chance, which tells where it is. Of rows along it, as
+    of pixels, all points at the boundary are as far from it, which nobody knows: the next row may just have been cut
+    off.
+    """
+    least, most, known = _STRIP_WIDTH
+    rows = np.flatnonzero(laplacian.boundary & (laplacian.component >= 0))
+    if not len(rows):
+        return np.full(len(spacing), least)
+    off, places = laplacian.boundary_distance[rows] / spacing[rows], laplacian.surface_points
+    _, near = cKDTree(places[rows]).query(places[rows], k=range(1, min(FEW, len(rows)) + 1))
+    strip = np.clip(most - known * off[near].mean(axis=1), least, most)
+    result: Floats = strip[cKDTree(places[rows]).query(places)[1]]
+    return result
 
 
 def _boundary_lengths(areas: Floats, distance: Floats, spacing: Floats) -> Floats:
