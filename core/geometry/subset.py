@@ -17,6 +17,7 @@ FINEST = 2**21 - 1  # voxels along each axis: three numbers of 21 bits share one
 _DISCS = 0.7  # points a squared radius that discs in random order leave on an area of one
 _VOXELS = 1.5  # voxels that a surface of area one meets for each squared edge, on average over its directions
 _FEW = 0.9  # of the points wanted, which are enough
+_CLOSER = 0.8  # times the radius, at which more points are filled in
 _SAMPLE, _AROUND = 20_000, 9  # of candidates, and neighbours of each, that give the area
 _TRIALS = 8  # of voxels, or of radii
 
@@ -80,16 +81,18 @@ def _candidates(points: Floats, low: Floats, extent: float, count: int, report: 
     finest = extent / FINEST
     wanted = _CANDIDATES * count
     edge = finest if len(points) <= wanted else max(extent * np.sqrt(_VOXELS / wanted), finest)
-    for _ in range(_TRIALS):
+    for left in reversed(range(_TRIALS)):
         report()
         keys = voxel_numbers(points, low, edge)
         order = np.argsort(keys)
         ordered = keys[order]
         first = np.flatnonzero(np.diff(ordered, prepend=-1))
         ratio = len(first) / wanted
-        if edge == finest or 0.8 < ratio < 1.5:
+        if edge == finest or 0.8 < ratio < 1.5 or left == 0:
             break
-        edge = max(edge * np.sqrt(np.clip(ratio, 0.05, 20.0)), finest)
+        # Where others are far closer than most, only the finest voxels may hold enough.
+        few = left == 1 and len(first) < count
+        edge = finest if few else max(edge * np.sqrt(np.clip(ratio, 0.05, 20.0)), finest)
     return _central(points, order, first, low, edge), ordered[first]
 
 
@@ -146,10 +149,11 @@ def _thin(points: Floats, keys: Ints, count: int, report: Report) -> Bools:
             best = kept
         else:
             below = radius
-    missing = count - np.count_nonzero(best)
-    if below and missing > (1.0 - _FEW) * count:  # no radius leaves as many, as where coordinates are rounded
+    below = below or radius
+    while np.count_nonzero(best) < _FEW * count:  # no radius leaves as many, as where coordinates are rounded
         more = np.flatnonzero(_discs(tree, np.where(best, rank - len(rank), rank), below) & ~best)
-        best[more[np.argsort(rank[more])[:missing]]] = True
+        best[more[np.argsort(rank[more])[: count - np.count_nonzero(best)]]] = True
+        below *= _CLOSER
     return best
 
 

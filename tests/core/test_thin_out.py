@@ -101,3 +101,38 @@ def test_the_work_can_be_stopped():
 
     with pytest.raises(core.Cancelled):
         core.thin_out(random_sphere(500), count=100, progress=progress)
+
+
+def _grid(size, spacing=1.0):
+    return np.stack(np.meshgrid(np.arange(size) * spacing, np.arange(size)), axis=-1).reshape(-1, 2)
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        np.column_stack([_grid(50), np.zeros(2500)]),
+        np.stack(np.meshgrid(*[np.arange(13.0)] * 3), axis=-1).reshape(-1, 3),
+        np.random.default_rng(0).integers(0, 15, (3000, 3)),
+        np.repeat(np.random.default_rng(0).random((800, 3)), 3, axis=0),
+        np.column_stack([_grid(50, 20.0), np.zeros(2500)]),
+        np.column_stack([np.tile(_grid(25), (4, 1)), np.repeat(np.arange(4.0), 625) * 1e-3]),
+        np.random.default_rng(0).random((2500, 3)),
+    ],
+    ids=["grid", "lattice", "integers", "duplicates", "lines", "stacked", "random"],
+)
+@pytest.mark.parametrize("share", [0.9, 0.5, 0.3, 0.03])
+def test_as_many_as_were_asked_for_are_chosen(points, share):
+    different = len(np.unique(points, axis=0))
+    count = int(share * different)
+    chosen = core.thin_out(points, count=count)
+    assert len(chosen) == count
+    assert len(np.unique(points[chosen], axis=0)) == count
+    assert 0.9 * count <= len(core.blue_noise_subset(points, count)) <= count
+
+
+def test_points_beyond_one_distance_are_somewhat_nearer():
+    """Of random points by far most are as far apart as the discs let them, the last ones not much nearer."""
+    points = np.column_stack([np.random.default_rng(1).random((6000, 2)), np.zeros(6000)])
+    chosen = points[core.thin_out(points, count=1000)]
+    apart = np.sort(cKDTree(chosen).query(chosen, k=2)[0][:, 1])
+    assert apart[0] > 0.6 * apart[100]

@@ -18,7 +18,9 @@ _STEP = 2.0  # each pass doubles the distance
 _DISCS = 0.7  # points a squared distance that stay on an area of one
 _EDGE = 0.015  # surface variation of an edge of 20 degrees, about
 _RAISED = 3.0  # times the median variation, which noise has everywhere
-_FEW = 0.95  # of the number wanted, which are enough
+_FEW = 0.95  # of the number wanted, which are enough to be filled up
+_SAME = 1.01  # ratio of distances that leave too many and too few points, and between which nothing is looked for
+_CLOSER = 0.8  # times the distance, at which more points are filled in
 _TRIALS = 12
 _SEED = 0
 
@@ -38,7 +40,7 @@ def thin_out(
     points : array_like, (n, 3)
         Coordinates [L].
     count : int, optional
-        How many to choose at most. Either this or the spacing is given.
+        How many to choose. Either this or the spacing is given.
     spacing : float, optional
         Least distance between chosen points [L].
     keep_edges : bool
@@ -50,9 +52,9 @@ def thin_out(
     -------
     ndarray, (k,) int
         Indices, ascending. No two chosen points are nearer than the spacing, and each other point is nearer than that
-        to a chosen one. By a count there are between 0.95 times that number and it, or somewhat fewer where the points
-        lie on a grid. All different places where these are no more than the count. The order of the points makes no
-        difference.
+        to a chosen one. By a count there are exactly so many: most at one distance, the last ones somewhat nearer. Of
+        points on a grid, which come many at once, these are chosen by chance. All different places where there are no
+        more than the count. The order of the points makes no difference.
 
     Raises
     ------
@@ -91,10 +93,10 @@ def thin_out(
     area, variation = _measure(points, lambda: report("Edges", 0.1))
     order = _order(points, variation if keep_edges else np.zeros(len(points)))
 
-    def thinned(distance: float) -> Ints:
-        return _discs(points, order, area, distance, lambda: report("Thinning", 0.5))
+    def thinned(distance: float, before: Ints = np.arange(0)) -> Ints:
+        return _discs(points, order, area, distance, before, lambda: report("Thinning", 0.5))
 
-    return thinned(real(spacing)) if count is None else _of_count(thinned, points, area, int(count))
+    return thinned(real(spacing)) if count is None else _of_count(thinned, points, order, area, int(count))
 
 
 def _measure(points: Floats, report: Report) -> tuple[float, Floats]:
@@ -121,13 +123,13 @@ def _order(points: Floats, variation: Floats) -> Ints:
     return rank
 
 
-def _of_count(thinned: Callable[[float], Ints], points: Floats, area: float, count: int) -> Ints:
-    """Choose points at the least distance, found by trial, that leaves at most a number of them."""
+def _of_count(thinned: Callable[..., Ints], points: Floats, order: Ints, area: float, count: int) -> Ints:
+    """Choose so many points at the least distance, found by trial, that leaves nearly as many, and fill them up."""
     best: Ints = np.sort(np.unique(points, axis=0, return_index=True)[1])
     if len(best) <= count:
         return best
     distance, below, most, best = np.sqrt(_DISCS * area / count), 0.0, np.inf, best[:0]
-    for trial in range(2 * _TRIALS):
+    for _ in range(2 * _TRIALS):
         chosen = thinned(distance)
         found = len(chosen)
         if found <= count:
@@ -137,22 +139,38 @@ def _of_count(thinned: Callable[[float], Ints], points: Floats, area: float, cou
                 break
         else:
             below = distance
-        if trial >= _TRIALS and len(best):
+        if most < _SAME * below:  # of points on a grid many come at once
             break
         distance *= np.sqrt(found / (0.975 * count))
         if not below < distance < most:
             distance = 0.5 * (below + most) if np.isfinite(most) else 2.0 * below
-    return best
+    distance = below or _CLOSER * distance
+    while len(best) < count:
+        more = np.setdiff1d(thinned(distance, best), best, assume_unique=True)
+        best = np.append(best, more[np.argsort(order[more])[: count - len(best)]])
+        distance *= _CLOSER
+    return np.sort(best)
 
 
-def _discs(points: Floats, order: Ints, area: float, distance: float, report: Report) -> Ints:
-    """Choose points of which no two are nearer than a distance, in their order, and none is farther from all."""
-    chosen, left = np.arange(0), np.arange(len(points))
+def _discs(points: Floats, order: Ints, area: float, distance: float, before: Ints, report: Report) -> Ints:
+    """Choose points of which no two are nearer than a distance, in their order, and none is farther from all.
+
+    Those chosen before stay, whatever their distances.
+    """
+    chosen: Ints = before
+    left: Ints = np.arange(len(points))
+    if len(before):
+        left = _away(points, left, chosen, distance)
     while len(left):
         chosen = np.append(chosen, _by_passes(points, left, order, area, distance, report))
         report()
-        left = left[cKDTree(points[chosen]).query(points[left], workers=cores())[0] >= distance]
+        left = _away(points, left, chosen, distance)
     return np.sort(chosen)
+
+
+def _away(points: Floats, rows: Ints, chosen: Ints, distance: float) -> Ints:
+    """Return which of some points are not nearer than a distance to any chosen one."""
+    return rows[cKDTree(points[chosen]).query(points[rows], workers=cores())[0] >= distance]
 
 
 def _by_passes(points: Floats, chosen: Ints, order: Ints, area: float, distance: float, report: Report) -> Ints:
