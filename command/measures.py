@@ -69,7 +69,10 @@ def part_table(laplacian, labels, values, volume_of, progress):
     """
     rows, notices = _rows(laplacian, "Component", None, values, progress), []
     if volume_of is not None:
-        rows, notices = _with_volumes(rows, volume_of(laplacian, progress))
+        try:
+            rows, notices = _with_volumes(rows, volume_of(laplacian, progress))
+        except core.TooFewPointsError as error:  # for a mesh, not for what else is measured
+            notices = [f"There is no volume: {error}"]
     if labels is not None:
         rows += _rows(laplacian, "Segment", labels, values, progress)
     return rows, [*notices, *_left_out(laplacian, labels, values), *laplacian.notices]

@@ -130,8 +130,8 @@ LAPLACIAN = {  # in the order of the panel
         ),
         Setting(
             "neighbors",
-            "With Local and Global, the smoothing length follows the distance to this neighbor. There must be"
-            " more points than that",
+            "With Local and Global, the smoothing length follows the distance to this neighbor; where there"
+            " are no more points than that it is extrapolated",
             _DEFAULTS.neighbors,
             6,
         ),

@@ -29,8 +29,8 @@ class LaplacianOptions:
         "adaptive": a smoothing length h per point, chosen by the widest gaps between the points around, h_ij
         the mean of both ends. "local": it follows the spacing alone. "global": one for all points.
     neighbors : int
-        "local", "global": the smoothing length is measured by the distance to this neighbour. There must be more points
-        than that.
+        "local", "global": the smoothing length is measured by the distance to this neighbor. Where a component has no
+        more points than that it is extrapolated from the last one.
     bandwidth_factor : float
         "local", "global": h in units of the distance to the neighbour named above. "adaptive": factor on
         the narrowest length, which is wider where the points ask for it. The radius of the kernel is 3 h.

@@ -24,7 +24,15 @@ from .noise import FALLING, FILLING, LEFT, mean_misfits, near_misfit, noise_leve
 from .normals import unit_normals
 from .outliers import find_outliers
 from .pairs import Pairs, find_pairs
-from .points import ScaledPoints, as_mask, check_boundary, check_distances, check_points, scale_points
+from .points import (
+    FEWEST_OF_SURFACE,
+    ScaledPoints,
+    as_mask,
+    check_boundary,
+    check_distances,
+    check_points,
+    scale_points,
+)
 from .quadrics import MANY, Quadrics, check_surface, count_curves, frames
 from .rounding import smooth_rounded
 from .rows import look_across_rows
@@ -287,6 +295,8 @@ def measure_surface(
             share=1.0 - len(own) / counts[1],
             noise=sample.noise,
             step=sample.step,
+            neighbors=options.neighbors,
+            short=0 if options.bandwidth == "adaptive" else _too_few(sample.component, options.neighbors),
             narrow=bool(np.mean(lengths > _NARROW * depth(nearest, edge.distance)) > MANY),
         ),
     )
@@ -310,21 +320,20 @@ def read_surface(
     Surface
         Of those that take part.
     """
-    needed = options.neighbors + 1
     decisions = Decisions(agreed)
-    scaled = scale_points(points if kept is None else points[kept], needed, decisions)
+    scaled = scale_points(points if kept is None else points[kept], decisions)
     if kept is not None:
         scaled = scaled.among(kept, len(points))
     report("Normals", 0.02)
-    sample = leave_outliers(scaled, needed, lambda: report("Normals", 0.04), decisions)
+    sample = leave_outliers(scaled, lambda: report("Normals", 0.04), decisions)
     report("Normals", 0.06)
-    sample = divide_components(sample, needed)
+    sample = divide_components(sample)
     report("Normals", 0.1)
     surface = with_scatter(fit_surface(sample, options.sheets))
     report("Normals", 0.12)
     surface = remove_noise(surface, options)
     report("Normals", 0.16)
-    return scaled, divide_sheets(surface, needed) if options.sheets else surface
+    return scaled, divide_sheets(surface) if options.sheets else surface
 
 
 def gather(scaled: ScaledPoints, decisions: Decisions) -> Sample:
@@ -335,16 +344,12 @@ def gather(scaled: ScaledPoints, decisions: Decisions) -> Sample:
     return Sample(scaled, np.zeros(count, dtype=int), nearest, noise, np.zeros((2, count)), smoothed.step, decisions)
 
 
-def leave_outliers(
-    scaled: ScaledPoints, needed: int, report: Report = lambda: None, decisions: Decisions | None = None
-) -> Sample:
+def leave_outliers(scaled: ScaledPoints, report: Report = lambda: None, decisions: Decisions | None = None) -> Sample:
     """Leave out distinct points that do not lie on the surface of their neighbours.
 
     Parameters
     ----------
     scaled : ScaledPoints
-    needed : int
-        How many points must be left.
     report : callable
         Called between its two stages; may raise `Cancelled`.
     decisions : Decisions, optional
@@ -362,24 +367,22 @@ def leave_outliers(
     """
     sample = gather(scaled, decisions or Decisions())
     report()
-    return drop_outliers(sample, needed)
+    return drop_outliers(sample)
 
 
-def drop_outliers(sample: Sample, needed: int) -> Sample:
+def drop_outliers(sample: Sample) -> Sample:
     """Leave outliers out of a sample of one component, see `leave_outliers`."""
     usual = sample.decisions.settle("spacing", lambda: float(np.median(sample.nearest.spacing)))
-    return _regroup(sample, np.where(find_outliers(sample.nearest, usual), -1, 0), needed)
+    return _regroup(sample, np.where(find_outliers(sample.nearest, usual), -1, 0))
 
 
-def divide_components(sample: Sample, needed: int) -> Sample:
+def divide_components(sample: Sample) -> Sample:
     """Divide points into components that gaps separate, and leave out those of too few points.
 
     Parameters
     ----------
     sample : Sample
         Of one component.
-    needed : int
-        How many points must be left.
 
     Returns
     -------
@@ -393,7 +396,7 @@ def divide_components(sample: Sample, needed: int) -> Sample:
     decisions = sample.decisions
     usual = decisions.settle("reach", lambda: float(np.median(gap_reach(sample.nearest))))
     label = decisions.label("component", sample.scaled, lambda: label_components(sample.nearest, usual))
-    divided = _regroup(sample, label, needed)
+    divided = _regroup(sample, label)
     decisions.settle("smallest", lambda: int(np.bincount(divided.component).min()))
     return divided
 
@@ -490,7 +493,7 @@ def _project(surface: Surface, noise: Floats, moving: Bools) -> tuple[Surface, B
     return fit_surface(moved, surface.sheets is not None, surface, changed), changed
 
 
-def divide_sheets(surface: Surface, needed: int) -> Surface:
+def divide_sheets(surface: Surface) -> Surface:
     """Divide components into disjoint sheets, and leave out points that lie off all of them.
 
     Returns
@@ -510,7 +513,7 @@ def divide_sheets(surface: Surface, needed: int) -> Surface:
         lambda: label_sheets(sample.nearest, surface.quadrics.normals, sample.component),
     )
     whole = replace(sample, nearest=sample.nearest.with_quadrics(surface.mixed))
-    divided = _regroup(whole, sheets, needed)
+    divided = _regroup(whole, sheets)
     if divided is whole or fitted is None:
         return surface
     kept, changed = sheets >= 0, sample.nearest.across(sheets)
@@ -519,13 +522,18 @@ def divide_sheets(surface: Surface, needed: int) -> Surface:
     return fit_surface(divided, True, Surface(divided, before.quadrics, before), changed[rows])
 
 
-def _regroup(sample: Sample, component: Ints, needed: int) -> Sample:
+def _regroup(sample: Sample, component: Ints) -> Sample:
     """Assign points to other components, and leave out those of component -1; the same sample if nothing changes."""
     kept = component >= 0
     if kept.all() and component.max() == sample.component.max():
         return sample
     count, left = int(np.count_nonzero(~kept)), int(np.count_nonzero(kept))
-    if left < max(needed, count):
+    if left < FEWEST_OF_SURFACE:
+        raise ComponentError(
+            f"{count} of {len(kept)} points lie apart from the others, so that {left} are left, and a surface needs at"
+            f" least {FEWEST_OF_SURFACE}. Add points around them."
+        )
+    if left < count:
         raise ComponentError(
             f"{count} of {len(kept)} points are in components of too few points. Use points of a surface, or delete the"
             " lone ones."
@@ -588,7 +596,15 @@ def locate_boundary(
     return measured if distance is None else measured.with_nearest(distance, nearest.spacing)
 
 
-def _notices(duplicates: int, left_out: int, share: float, noise: Floats, step: float, narrow: bool) -> list[str]:
+def _too_few(component: Ints, neighbors: int) -> int:
+    """Return how many points are in components where none has so many neighbors."""
+    size = np.bincount(component)
+    return int(size[size <= neighbors].sum())
+
+
+def _notices(
+    duplicates: int, left_out: int, share: float, noise: Floats, step: float, neighbors: int, short: int, narrow: bool
+) -> list[str]:
     """Return texts on what was merged, smoothed and left out."""
     noisy, filling = np.mean(noise > 0.0), np.mean(noise > FILLING)
     level, rounded = noise.mean() / max(noisy, 1e-300), step > 0.0
@@ -602,6 +618,8 @@ def _notices(duplicates: int, left_out: int, share: float, noise: Floats, step: 
         f"Noise of more than half the spacing, at {filling:.0%} of the points, was smoothed within the operator, and"
         " details with it: areas may be off by 10 % and more. Use more exact points.": filling > MANY and not rounded,
         f"Outliers and small components left out of the operator: {left_out} ({100.0 * share:.2g} %).": left_out,
+        f"Points in components of no more than {neighbors} points: {short}. How far off the neighbor of that number"
+        " would be was extrapolated there.": short,
         "Part of the surface is so narrow that the kernel covers several of its sides: areas there may be off by 10 %"
         " and more. Add points.": narrow,
     }

@@ -16,6 +16,7 @@ from ..types import Array, Bools, Floats, Ints
 from .agreed import Decisions
 
 FEWEST = 5  # points of a boundary that is given
+FEWEST_OF_SURFACE = 7  # different points: each has as many others as a quadric has coefficients
 _SAME = 1e-9  # of the scale: closer points count as one, as areas between them would drown in rounding
 _LARGEST = 1e60  # coordinates [L], and its inverse the least extent: further powers of lengths must be numbers, too
 
@@ -61,7 +62,7 @@ def check_points(points: ArrayLike) -> Floats:
             f"The {len(result)} points span only {extent:.3g}: squared lengths would underflow."
             f" Scale the points to more than {1.0 / _LARGEST:g}."
         )
-    if given.dtype.kind == "f" and extent < 8192.0 * np.finfo(given.dtype).eps * largest:
+    if len(result) > 1 and given.dtype.kind == "f" and extent < 8192.0 * np.finfo(given.dtype).eps * largest:
         raise InvalidPointsError(
             f"The {len(result)} points lie {largest:.3g} from the origin but span only {extent:.3g}:"
             f" {given.dtype} coordinates do not resolve them there. Shift them to the origin before they are"
@@ -120,22 +121,20 @@ class ScaledPoints:
         return replace(self, inverse=inverse, first=rows[self.first])
 
 
-def scale_points(points: Floats, needed: int, decisions: Decisions | None = None) -> ScaledPoints:
+def scale_points(points: Floats, decisions: Decisions | None = None) -> ScaledPoints:
     """Centre, scale and merge duplicates, so that all that follows is free of units.
 
     Parameters
     ----------
     points : ndarray, (n, 3)
         From `check_points`.
-    needed : int
-        How many distinct points the neighbourhoods need.
     decisions : Decisions, optional
         Of the center and the scale.
 
     Raises
     ------
     TooFewPointsError, NotASurfaceError
-        Fewer distinct points than needed, or all of them on one line.
+        Fewer distinct points than a surface needs, or all of them on one line.
     """
     decisions = decisions or Decisions()
     # Means over sorted numbers, so that rounding, and all that hangs on it, is the same in any order of the points.
@@ -146,11 +145,11 @@ def scale_points(points: Floats, needed: int, decisions: Decisions | None = None
         centered /= scale
     distinct, first, inverse = _merge(centered)
     copies = np.bincount(inverse)
-    if len(distinct) < needed:
+    if len(distinct) < FEWEST_OF_SURFACE:
         among = f" among {len(points)}" if len(distinct) < len(points) else ""
         raise TooFewPointsError(
-            f"The neighborhoods need {needed} different points, and there are {len(distinct)}{among}. Add points, or"
-            " lower the number of neighbors."
+            f"A surface needs at least {FEWEST_OF_SURFACE} different points, and there are {len(distinct)}{among}."
+            " Add points."
         )
     spread = np.linalg.eigvalsh(distinct.T @ distinct / len(distinct))
     if spread[1] < 1e-10 * spread[2]:

@@ -60,7 +60,7 @@ def look_for_rounding(site: Site, state: Any) -> tuple[ScaledPoints, Told]:
     """Look whether the points of a tile are rounded in steps, and along which direction."""
     points = check_points(site.part.points)
     check_memory(len(points), site.options)
-    scaled = scale_points(points, site.needed, site.decisions())
+    scaled = scale_points(points, site.decisions())
     rounding, count = find_rounding(cKDTree(scaled.points)), np.count_nonzero(site.inner(scaled))
     return scaled, {"count": np.array(count), "squares": count * np.outer(rounding, rounding)}
 
@@ -89,7 +89,7 @@ def agree_on_spacing(shelf: Shelf, options: LaplacianOptions) -> Record:
 
 def find_reach(site: Site, sample: Sample) -> tuple[Sample | None, Told]:
     """Leave outliers out."""
-    left = drop_outliers(replace(sample, decisions=site.decisions()), site.needed)
+    left = drop_outliers(replace(sample, decisions=site.decisions()))
     changed = left.nearest is not sample.nearest
     return left if changed else None, {"reach": gap_reach(left.nearest)[site.inner(left.scaled)]}
 
@@ -136,7 +136,7 @@ def agree_on_components(shelf: Shelf, options: LaplacianOptions) -> Record:
 
 def find_noise(site: Site, sample: Sample) -> tuple[Fitted, Told]:
     """Fit quadrics, and measure the noise."""
-    sample = divide_components(replace(sample, decisions=site.decisions()), site.needed)
+    sample = divide_components(replace(sample, decisions=site.decisions()))
     surface = with_scatter(fit_surface(sample, site.options.sheets))
     inner = site.inner(surface.sample.scaled)
     curves = count_curves(surface.sample.nearest.quadrics.roundness[inner])
@@ -284,7 +284,7 @@ def agree_on_length(shelf: Shelf, options: LaplacianOptions) -> Record:
 def divided(site: Site, fitted: Fitted) -> tuple[Surface, bool]:
     """Return the surface of a tile, divided into sheets if the options ask for it, and whether that is another one."""
     given = _with_decisions(site, fitted.surface)
-    surface = divide_sheets(given, site.needed) if site.options.sheets else given
+    surface = divide_sheets(given) if site.options.sheets else given
     return surface, surface is not given
 
 

@@ -45,11 +45,6 @@ class Site:
         """What is agreed on."""
         return self.shelf.record
 
-    @property
-    def needed(self) -> int:
-        """How many points neighbourhoods need."""
-        return self.options.neighbors + 1
-
     def inner(self, scaled: ScaledPoints) -> Bools:
         """Return which of the distinct points lie in the box, (m,)."""
         return self.part.inner[scaled.first]

@@ -252,7 +252,7 @@ def test_it_can_be_cancelled(clouds):
 @pytest.mark.parametrize(
     ("points", "error", "text"),
     [
-        (np.eye(3)[:2], core.TooFewPointsError, "In the points: .* need 21 different points, and there are 2"),
+        (np.eye(3)[:2], core.TooFewPointsError, "In the points: .* needs at least 7 different points, and there are 2"),
         (np.full((40, 3), np.nan), core.InvalidPointsError, "In the points: 40 of 40 points are not finite"),
         (np.zeros((40, 2)), core.InvalidPointsError, r"In the points: .*shape \(n, 3\)"),
         (np.linspace(0, 1, 40)[:, None] * [1.0, 2.0, 3.0], core.NotASurfaceError, "In the points: .*straight line"),

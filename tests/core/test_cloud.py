@@ -22,8 +22,6 @@ from core.geometry.cloud import (
 from core.geometry.points import scale_points
 from core.geometry.winding import orient_by_winding
 
-NEEDED = 101
-
 
 def gaps_of(surface, oriented):
     """How wide the gaps between points are, before a boundary is known."""
@@ -33,7 +31,7 @@ def gaps_of(surface, oriented):
 
 
 def sample_of(points):
-    return divide_components(leave_outliers(scale_points(points, NEEDED), NEEDED), NEEDED)
+    return divide_components(leave_outliers(scale_points(points)))
 
 
 def radii(sample):
@@ -101,7 +99,7 @@ def test_sheets_that_nowhere_meet_become_components():
     points = np.concatenate([grid(20), grid(20) + [0.0, 0.0, 1.5]])
     surface = fit_surface(sample_of(points), True)
     assert surface.sample.component.max() == 0
-    divided = divide_sheets(surface, NEEDED)
+    divided = divide_sheets(surface)
     heights = divided.sample.scaled.points[:, 2] * divided.sample.scaled.scale
     np.testing.assert_array_equal(np.bincount(divided.sample.component), [400, 400])
     assert [len(np.unique(np.sign(heights[divided.sample.component == part]))) for part in (0, 1)] == [1, 1]
@@ -109,7 +107,7 @@ def test_sheets_that_nowhere_meet_become_components():
 
 def test_one_sheet_stays_as_it_is():
     surface = fit_surface(sample_of(fibonacci_sphere(900)), True)
-    assert divide_sheets(surface, NEEDED) is surface
+    assert divide_sheets(surface) is surface
 
 
 class TestBoundary:
@@ -150,7 +148,7 @@ def test_normals_are_the_given_ones():
 def test_the_walk_is_these_stages():
     points = np.concatenate([grid(24), grid(24) + [0.0, 0.0, 1.5]])
     options = core.LaplacianOptions()
-    surface = divide_sheets(fit_surface(sample_of(points), True), NEEDED)
+    surface = divide_sheets(fit_surface(sample_of(points), True))
     sample = surface.sample
     oriented = orient_by_winding(sample.nearest, surface.quadrics.normals, sample.places, sample.component)
     cloud = read_cloud(points, options)

@@ -250,11 +250,6 @@ class TestLonePoints:
 
 
 class TestTooLittleLeft:
-    def test_fewer_points_than_the_neighborhoods_need(self):
-        points = np.concatenate([fibonacci_sphere(90), 50.0 + 10.0 * fibonacci_sphere(90)[:60:5]])
-        with pytest.raises(core.ComponentError, match="12 of 102 points are in components of too few points"):
-            core.build_laplacian(points)
-
     def test_most_points_in_small_components(self):
         components = [0.1 * fibonacci_sphere(30) + [3.0 * i, 3.0, 0.0] for i in range(10)]
         with pytest.raises(core.ComponentError, match="300 of 500 points are in components of too few points"):

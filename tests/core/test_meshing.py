@@ -212,7 +212,7 @@ def test_detail_that_no_memory_holds(operators):
 
 
 def test_detail_coarser_than_the_surface(operators):
-    with pytest.raises(core.PointCloudError, match="Raise the detail"):
+    with pytest.raises(core.PointCloudError, match="raise the detail"):
         core.mesh_surface(operators("even sphere"), 1e-3)
 
 

@@ -172,11 +172,6 @@ def test_settings_without_sense_are_refused(settings, text):
         core.stray_points(random_sphere(100), **settings)
 
 
-def test_too_few_points_are_refused():
-    with pytest.raises(core.TooFewPointsError, match="need 13 different points, and there are 12"):
-        core.stray_points(random_sphere(12))
-
-
 def test_the_work_can_be_stopped_at_each_stage():
     stages = []
     core.stray_points(random_sphere(200), progress=lambda stage, share: stages.append((stage, share)))

@@ -18,7 +18,6 @@ from ...geometry import (
 )
 from ...types import Bools, Floats, Progress
 
-_NEEDED = 13  # distinct points: the point itself and as many others as tell its spacing
 _SPARSE = 2.0  # times the spacing of the cloud: sparser parts must have more points
 
 
@@ -66,7 +65,7 @@ class Strays:
     def __init__(self, points: ArrayLike, *, progress: Progress | None = None) -> None:
         report = progress or (lambda stage, fraction: None)
         report("Neighbors", 0.0)
-        scaled = scale_points(check_points(points), _NEEDED)
+        scaled = scale_points(check_points(points))
         nearest = look_across_rows(smooth_rounded(find_nearest(scaled.points)).nearest)
         report("Strays", 0.3)
         scores = stray_scores(nearest, lambda: report("Strays", 0.3))

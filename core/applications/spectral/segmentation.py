@@ -176,8 +176,8 @@ def segment(
         )
     if parts > components and components + parts >= n // 3:  # as many modes as n points carry
         raise TooFewPointsError(
-            f"{parts} parts need {components + parts + 1} modes, but {n} points carry at most {n // 3}. Ask for fewer"
-            " parts."
+            f"{parts} parts need {components + parts + 1} modes, but {n} points carry at most {n // 3}."
+            f" {_advice(n // 3, components)}"
         )
     if spectrum is not None and len(spectrum.eigenvectors) != n:
         raise InvalidPointsError(
@@ -225,6 +225,12 @@ def modes_needed(laplacian: LaplaceBeltrami, parts: int) -> int:
     return _constant_modes(laplacian) + _MODES * _check_parts(parts) + 1
 
 
+def _advice(modes: int, components: int) -> str:
+    """Return what to do where there are only so many modes."""
+    most = modes - components - 1
+    return f"Ask for at most {most}, or add points." if most > components else "Add points."
+
+
 def _check_parts(parts: int) -> int:
     """Return the number of parts."""
     if not whole(parts) >= 1:
@@ -253,7 +259,7 @@ def _signature(laplacian: LaplaceBeltrami, parts: int, spectrum: Spectrum | None
     if count <= constant + parts:
         raise TooFewPointsError(
             f"{parts} parts need {constant + parts + 1} modes, but {len(laplacian.points)} points resolve"
-            f" {count}. Ask for fewer parts."
+            f" {count}. {_advice(count, constant)}"
         )
     values, last = spectrum.eigenvalues[constant : count - 1], spectrum.eigenvalues[count - 1]
     values = np.maximum(values, _WEAK * last)

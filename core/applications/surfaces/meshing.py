@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from ...arguments import positive
 from ...cores import cores
-from ...errors import NotEnoughMemoryError, PointCloudError
+from ...errors import NotEnoughMemoryError, TooFewPointsError
 from ...geometry import Prolongation, check_points
 from ...memory import available_memory
 from ...operator import ImplicitSurface, LaplaceBeltrami
@@ -81,7 +81,9 @@ def mesh_surface(laplacian: LaplaceBeltrami, detail: float = 1.0, *, progress: P
     Raises
     ------
     PointCloudError
-        A detail that is not above zero, or so fine or so coarse that there is no mesh.
+        A detail that is not above zero, or so fine that there is no mesh.
+    TooFewPointsError
+        Points too far apart for a mesh of that detail.
     NotEnoughMemoryError
         A grid of more corners than the free memory is enough for, before the start.
 
@@ -127,9 +129,9 @@ def mesh_surface(laplacian: LaplaceBeltrami, detail: float = 1.0, *, progress: P
     report("Faces", 0.85)
     vertices, faces, sizes = _without_fragments(*_polygons(grid, cuts), _FRAGMENT * size**2)
     if not len(faces) or len(faces) < _FEWEST:
-        raise PointCloudError(
+        raise TooFewPointsError(
             f"The {np.count_nonzero(kept)} points give no mesh at a detail of {size:g}: voxels are larger than the"
-            " surface, or too few points lie between its edges. Raise the detail, or add points."
+            " surface, or too few points lie between its edges. Add points; where there are many, raise the detail."
         )
     vertices, faces, sizes = all_quads(vertices, faces, sizes)
     vertices = _onto(surface, vertices, _boundary(faces), sizes, lambda: report("Faces", 0.9))
@@ -306,7 +308,7 @@ def _joined(grid: Grid, cuts: _Cuts) -> Ints:
     angle[several] = np.arctan2(y, x)
     enters[several] = x * v - y * u > 0.0
     order = np.lexsort([angle, face])
-    start = np.concatenate([[0], np.cumsum(number)[:-1]])
+    start = np.cumsum(number) - number
     late = order[start[(number > 2) & ~enters[order[start]]]]
     angle[late] += 2.0 * np.pi
     order = np.lexsort([angle, face])
