@@ -148,7 +148,8 @@ class TestSignedDistance:
         found, height = attribute(strip, "lb_signed_distance"), 2.0 * local_points(strip)[:, 1] - 2.0
         up = attribute(strip, "lb_disc")[0, 2]
         line = 2.0 * local_points(strip)[int(np.argmin(np.abs(found)))][1] - 2.0  # the nearest row of points
-        assert_allclose(found * np.sign(up), height - line, atol=0.04)
+        # Points are up to 0.04 off their rows, that of the nearest point and those that the path runs through.
+        assert_allclose(found * np.sign(up), height - line, atol=0.08)
 
     def test_around_the_equator(self):
         obj = add_object(sphere_points(3000))
