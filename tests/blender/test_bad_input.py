@@ -27,7 +27,7 @@ def scattered(points):
 CLOUDS = {
     "NaN": (lambda points: changed(points, 3, np.nan), "1 of 1000 points.*Delete"),
     "infinite": (lambda points: changed(points, slice(3, 5), np.inf), "2 of 1000 points.*Delete"),
-    "too few": (lambda points: points[:20], "there are 20\\."),
+    "too few": (lambda points: points[:6], "there are 6\\."),
     "collinear": (lambda points: points * (1, 0, 0), "1000 points.*line"),
     "all at one place": (lambda points: 0 * points, "there are 1 among 1000"),
     "far from the origin": (far_away, "from the origin.*Shift"),

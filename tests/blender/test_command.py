@@ -395,9 +395,9 @@ class TestVerbs:
 
     def test_settings_count(self, run, tmp_path):
         np.savetxt(tmp_path / "a.xyz", POINTS)
-        code, (line,) = run("signature", tmp_path / "a.xyz", "--count", 3, "--modes", 20, "--neighbors", 3000)
+        code, (line,) = run("signature", tmp_path / "a.xyz", "--count", 3, "--modes", 20, "--bandwidth-factor", 0.1)
         assert code == 1
-        assert "neighborhoods need 3001 different points" in line["error"]
+        assert "leaves fewer than 10 points" in line["error"]
 
     def test_choices_of_an_operator_are_options(self, run):
         assert run("smooth", "x.ply", "--method", "NONSENSE")[0] == 2
