@@ -42,6 +42,37 @@ def test_edges_stay_where_smoothing_rounds_them(noisy_cube):
     assert clean < 0.65 * rms(off_cube(core.fair_points(noisy_cube)))
 
 
+PLATE, NOISE = np.array([30.0, 20.0, 1.0]), 0.1
+
+
+def plate(seed):
+    """Return points of a plate, 60 x 40 x 2, with noise across it."""
+    rng, count = np.random.default_rng(seed), 6000
+    across = rng.choice(3, count, p=1.0 / PLATE / np.sum(1.0 / PLATE))
+    points = rng.uniform(-1.0, 1.0, (count, 3)) * PLATE
+    points[np.arange(count), across] = rng.choice([-1.0, 1.0], count) * PLATE[across]
+    points[np.arange(count), across] += NOISE * rng.standard_normal(count)
+    return points
+
+
+def off_plate(points):
+    beyond = np.abs(points) - PLATE
+    return np.linalg.norm(np.maximum(beyond, 0.0), axis=1) + np.abs(np.minimum(beyond.max(axis=1), 0.0))
+
+
+@pytest.mark.parametrize("twice", [False, True])
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_no_point_of_a_thin_plate_is_thrown_off_it(seed, twice):
+    """At edges two spacings apart the normal of a point may be that of no neighbor."""
+    points = plate(seed)
+    if twice:
+        points = np.concatenate([points, points[:1500] + 1e-6 * np.random.default_rng(9).standard_normal((1500, 3))])
+    clean = core.clean_points(core.build_laplacian(points))
+    assert rms(off_plate(clean)) < 0.8 * rms(off_plate(points))
+    assert np.linalg.norm(clean - points, axis=1).max() < 10.0 * NOISE
+    assert np.mean(off_plate(clean) > off_plate(points) + 3.0 * NOISE) <= 1e-3
+
+
 def test_points_move_along_one_direction_each_whatever_the_rounds(noisy_cube):
     """Without edges the direction is the normal of the operator."""
     moved = core.clean_points(noisy_cube, keep_edges=False) - noisy_cube.points

@@ -10,6 +10,7 @@ from ...types import Array, Floats, Ints, Progress
 _WIDTH = 0.6  # smoothing lengths of the Gaussian over the distance
 _TURN = 0.25  # of the Gaussian over the difference of normals: across an edge of 45 degrees there is next to nothing
 _TURNS, _STEPS = 12, 10  # rounds of both filters
+_FARTHEST = 3.0  # times the scatter of heights around: farther off is no noise
 _STEP = 0.7  # of the mean height: less than one, for even samplings
 
 
@@ -24,7 +25,9 @@ def clean_points(
 
     Normals are filtered first: each becomes the mean of those around, weighted by distance and by how little they
     differ, so that edges grow sharp. Then points move along these normals by their mean height over circular arcs from
-    their neighbors, with the same weights. Spheres, cylinders and planes stay as they are.
+    their neighbors, with the same weights; each point counts itself, so that one of which no neighbor knows the side
+    stays where it is. None moves farther than three times the scatter of the heights around it. Spheres, cylinders and
+    planes stay as they are.
 
     Parameters
     ----------
@@ -76,14 +79,19 @@ def clean_points(
         normals = summed / np.linalg.norm(summed, axis=1)[:, None]
     if keep_edges:
         weight = near * _alike(normals, first, second)
-    total = np.maximum(np.bincount(first, weight, len(normals)), np.finfo(float).tiny)
+    # Each counts itself, at its own height: where no neighbor agrees with a point it stays.
+    total = own + np.bincount(first, weight, len(normals))
     arcs = 0.5 * (normals[first] + normals[second])
     height, free = np.zeros(len(normals)), ~laplacian.boundary if dirichlet else np.ones(len(normals), dtype=bool)
+    most = np.full(len(normals), np.inf)
     for step in range(_STEPS):
         report("Heights", 0.5 + 0.5 * step / _STEPS)
         points = laplacian.points + height[:, None] * normals
         above = np.einsum("ij,ij->i", points[first] - points[second], arcs)
-        height -= _STEP * free * np.bincount(first, weight * above, len(normals)) / total
+        mean, square = (np.bincount(first, weight * above**power, len(normals)) / total for power in (1, 2))
+        if step == 0:
+            most = _FARTHEST * _medians(np.sqrt(np.maximum(square - mean**2, 0.0)), first, second)
+        height = np.clip(height - _STEP * free * mean, -most, most)
     return laplacian.points + height[:, None] * normals
 
 
@@ -98,6 +106,14 @@ def _couples(laplacian: LaplaceBeltrami) -> tuple[Ints, Ints, Floats]:
     width = _WIDTH * np.minimum(laplacian.smoothing_lengths[first], laplacian.smoothing_lengths[second])
     weight: Floats = np.exp(-0.5 * np.einsum("ij,ij->i", offset, offset) / width**2) * laplacian.areas[second]
     return first, second, weight
+
+
+def _medians(values: Floats, first: Ints, second: Ints) -> Floats:
+    """Return the median of a quantity over the neighbors of each point, (n,); zero where there are none."""
+    count = np.bincount(first, minlength=len(values))
+    ordered = np.append(values[second[np.lexsort((values[second], first))]], 0.0)
+    result: Floats = np.where(count > 0, ordered[np.cumsum(count) - count + count // 2], 0.0)
+    return result
 
 
 def _alike(normals: Floats, first: Ints, second: Ints) -> Floats:
