@@ -14,8 +14,9 @@ from .nearest import COUNT, FEW, NEXT, Nearest, fading_weights, find_nearest, sp
 from .noise import LARGEST
 from .quadrics import frames
 
-_SAMPLE, _CANDIDATES = 2000, 200  # neighborhoods looked at, and planes in them that may be a level
-_PARALLEL = 1e-3  # angle between planes of one direction, at most: what single precision leaves of pixels
+_SAMPLE = 2000  # neighborhoods looked at
+_CANDIDATES, _COMPARED = 200, 5000  # planes in them that may be a level, and those that these are compared with
+_AGREEING = 1.0 - 0.5 * 1e-3**2  # cosine between planes of one direction: what single precision leaves of pixels
 _SAME = 0.01  # spacings between points of one level, at most
 _COMMON = 0.02  # share of such planes that are parallel
 _STEP = 0.3, 3.5  # spacings from level to level: finer ones are no more than noise, coarser ones are several surfaces
@@ -117,14 +118,14 @@ def _common_normal(offset: Floats) -> Floats | None:
     normal = normal[length > 0.25] / length[length > 0.25, None]
     if len(normal) < _CANDIDATES:
         return None
-    some = normal[:: len(normal) // _CANDIDATES]
-    agreeing = np.abs(some @ normal.T) > 1.0 - 0.5 * _PARALLEL**2
-    count = agreeing.sum(axis=1)
-    best = count.argmax()
-    if count[best] < _COMMON * len(normal):
+    some, others = normal[:: len(normal) // _CANDIDATES], normal[:: 1 + len(normal) // _COMPARED]
+    share = np.mean(np.abs(some @ others.T) > _AGREEING, axis=1)
+    best = some[share.argmax()]
+    if share.max() < _COMMON:
         return None
-    side = np.where(normal[agreeing[best]] @ some[best] < 0.0, -1.0, 1.0)
-    mean = side @ normal[agreeing[best]]
+    cosine = normal @ best
+    agreeing = np.abs(cosine) > _AGREEING
+    mean = np.sign(cosine[agreeing]) @ normal[agreeing]
     return mean / np.linalg.norm(mean)
 
 
