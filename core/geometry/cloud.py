@@ -240,11 +240,7 @@ def measure_surface(
     decisions = sample.decisions
 
     report("Normals", 0.18)
-    own = quadrics.normals if given is None else given
-    oriented = decisions.sides(
-        sample.scaled, own, lambda: orient_by_winding(nearest, own, sample.places, sample.component)
-    )
-
+    oriented = orient_surface(surface, given)
     report("Neighbors", 0.2)
     gaussian = quadrics.gaussian_curvature
     sides = one_side(quadrics, oriented) if given is not None else find_sides(nearest, quadrics).toward(oriented)
@@ -302,10 +298,18 @@ def measure_surface(
     )
 
 
+def orient_surface(surface: Surface, given: Floats | None = None) -> Floats:
+    """Return the normals of quadrics, or given ones, (m, 3), with signs that agree, outwards or up."""
+    sample, own = surface.sample, surface.quadrics.normals if given is None else given
+    return sample.decisions.sides(
+        sample.scaled, own, lambda: orient_by_winding(sample.nearest, own, sample.places, sample.component)
+    )
+
+
 def read_surface(
     points: Floats,
     options: LaplacianOptions,
-    report: Progress,
+    report: Progress = lambda stage, fraction: None,
     kept: Ints | None = None,
     agreed: Agreed | None = None,
 ) -> tuple[ScaledPoints, Surface]:
@@ -662,8 +666,9 @@ def estimate_normals(points: ArrayLike, options: LaplacianOptions = LaplacianOpt
     >>> print(np.abs(core.estimate_normals(points) - points).max().round(2))
     0.0
     """
-    cloud = read_cloud(points, options)
-    return cloud.scaled.scatter(cloud.normals, (0.0, 0.0, 1.0))
+    check_options(options)
+    surface = read_surface(check_points(points), options)[1]
+    return surface.sample.scaled.scatter(orient_surface(surface), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True, eq=False)
