@@ -270,10 +270,10 @@ def test_bones_of_another_scale_or_outside_are_told():
 
 def test_few_points_follow_the_nearest_bone():
     corners = np.array([(x, y, z) for x in (-0.1, 0.1) for y in (-0.1, 0.1) for z in (0.5, 0.7)])
-    obj, armature = add_object(corners), add_armature(BONES)
+    obj, armature = add_object(corners[:6]), add_armature(BONES)
     choose(armature, obj)
     bpy.ops.meshfree.auto_weights()
-    assert_allclose(weights_of(obj), np.tile([0.0, 1.0], (8, 1)))
+    assert_allclose(weights_of(obj), np.tile([0.0, 1.0], (6, 1)))
     assert "the nearest bone alone" in tell(obj)
 
 
