@@ -8,7 +8,6 @@ table goes to docs/real_shapes.md.
 
 import os
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -30,8 +29,8 @@ one, against those of the refined mesh. Face is an open surface; the 1,722 verti
 technical drawing, too few for its walls. Boundary: number of points found at a boundary. Zero modes: as many as
 components, unless parts are disconnected. Least share: share of the area that the most localized of the first 21 modes
 covers, its participation ratio. Doubtful: share of the area with `lb_trust` below one half. The constants were chosen
-on rocker-arm, cat, arm, cheburashka, screwdriver and fandisk; the others were run with the same ones. Seconds were
-measured on a machine that ran other jobs, too.
+on rocker-arm, cat, arm, cheburashka, screwdriver and fandisk; the others were run with the same ones. Times are
+in docs/scaling.md.
 
 Made by `MESHFREE_ZOO=folder python -m benchmarks.real_shapes`; the shapes are not part of the project.
 """
@@ -137,9 +136,7 @@ def eigenvalue_error(found, exact):
 
 def measure(points, exact):
     """Figures of this project for a cloud of area 1."""
-    began = time.perf_counter()
     laplacian = core.build_laplacian(points)
-    seconds = time.perf_counter() - began
     raw = laplacian.eigenpairs(MODES, raw=True)
     try:
         error, mean = eigenvalue_error(laplacian.corrected(raw).eigenvalues, exact)
@@ -156,7 +153,6 @@ def measure(points, exact):
         "local": 1.0 / (laplacian.areas @ raw.eigenvectors**4).max() / laplacian.areas.sum(),
         "left out": int((laplacian.component < 0).sum()),
         "doubtful": laplacian.areas[laplacian.trust < 0.5].sum() / laplacian.areas.sum(),
-        "seconds": seconds,
     }
 
 
@@ -179,12 +175,12 @@ def real_shapes(names=()):
                 + [f"{ours['eigenvalues']:.2%}", f"{peer['eigenvalues']:.2%}", str(ours["boundary"])]
                 + [str(ours["components"]), str(ours["zero"]), f"{ours['local']:.1%}"]
                 + [str(ours["left out"]), f"{ours['doubtful']:.0%}"]
-                + [f"{ours['pairs']:.0f}", f"{ours['seconds']:.1f}"]
+                + [f"{ours['pairs']:.0f}"]
             )
             print(" | ".join(rows[-1]), flush=True)
     header = ["shape", "points", "n", "area", "peer", "eigenvalues", "peer", "boundary", "components"]
     header += ["zero modes", "least share", "left out"]
-    return Table("Real shapes", [*header, "doubtful", "pairs a row", "build s"], rows)
+    return Table("Real shapes", [*header, "doubtful", "pairs a row"], rows)
 
 
 if __name__ == "__main__":
