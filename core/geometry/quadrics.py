@@ -132,7 +132,9 @@ def fit_quadrics(
         scatter = _FADING * np.sqrt((bend[3] + bend[5]) * _sums(share, share))
         fitted.scatter[block] = scatter / unit**2
         least = (bend * solved[:, 6])[3:].T @ _FORM / ((bend**2)[3:].T @ _FORM)
-        fit = (solved[:, 6] - np.where(scatter > _LOOSE, least, 0.0) * bend).T
+        # A point away from all others, such as an outlier, has no rows around it.
+        near, last = (sum(step[:, end] ** 2 for step in offset) for end in (1, -1))
+        fit = (solved[:, 6] - np.where((scatter > _LOOSE) & (4.0 * near < last), least, 0.0) * bend).T
         missed = z - sum(values * part[:, None] for values, part in zip(basis, fit.T, strict=True))
         slope = 1.0 + fit[:, 1] ** 2 + fit[:, 2] ** 2
         local = np.stack([np.ones_like(slope), -fit[:, 2], -fit[:, 1]], axis=1) / np.sqrt(slope)[:, None]
