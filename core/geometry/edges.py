@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..algebra import blocks, on_all_cores
-from ..types import Floats, Ints
+from ..types import Bools, Floats, Ints
 from .moments import MET
 from .nearest import POWER, SMOOTH, Nearest
 from .noise import LEFT
@@ -80,25 +81,12 @@ def find_sides(nearest: Nearest, quadrics: Quadrics) -> Sides:
     for beside in (False, True):
         turning = rows
         for _ in range(_ROUNDS):
-
-            def fit(part: slice, turning: Ints = turning, beside: bool = beside) -> tuple[Ints, Quadrics]:
-                some = turning[part]
-                index = nearest.index[some]
-                toward = found.normals[_closest(nearest, found, some) if beside else some]
-                cosine = np.abs(np.einsum("ikc,ic->ik", found.normals[index], toward))
-                weight = nearest.weight[some] * np.maximum((cosine - SMOOTH) / (1.0 - SMOOTH), 0.0) ** POWER
-                count = weight.sum(axis=1) ** 2 / np.maximum((weight**2).sum(axis=1), 1e-300)
-                enough = count > _COEFFICIENTS
-                sharp[some[~enough]] = 0.0
-                some, index, weight, count = some[enough], index[enough], weight[enough], count[enough]
-                fitted = fit_quadrics(nearest.points, index, weight, some, toward[enough])
-                left = fitted.misfit / (np.sqrt(1.0 - _COEFFICIENTS / count) * quadrics.misfit[some])
-                sharp[some] = 1.0 - np.sqrt(np.minimum(left, 1.0))
-                return some, fitted
-
             last = found.normals[turning]
-            for some, fitted in on_all_cores(fit, blocks(len(turning), _BLOCK)):
-                found.assign(some, fitted)
+            refit = functools.partial(_refit, nearest, quadrics, found, beside)
+            parts = [turning[block] for block in blocks(len(turning), _BLOCK)]
+            for part, (enough, fitted, sure) in zip(parts, on_all_cores(refit, parts), strict=True):
+                found.assign(part[enough], fitted)
+                sharp[part] = sure
             turned = 1.0 - np.abs(np.einsum("ij,ij->i", found.normals[turning], last))
             turning = turning[turned > MET]
             if not len(turning):
@@ -106,6 +94,34 @@ def find_sides(nearest: Nearest, quadrics: Quadrics) -> Sides:
     lost = rows[sharp[rows] == 0.0]
     found.assign(lost, quadrics.take(lost))
     return Sides(found.normals, found.shape_operator, sharp, quadrics.normals)
+
+
+def _refit(
+    nearest: Nearest, quadrics: Quadrics, found: Quadrics, beside: bool, rows: Ints
+) -> tuple[Bools, Quadrics, Floats]:
+    """Fit quadrics to those neighbours of some points whose last normals agree with theirs, or with one beside them.
+
+    Returns
+    -------
+    ndarray, (k,) bool
+        Which of the points have enough such neighbours.
+    Quadrics
+        Of these points.
+    ndarray, (k,)
+        How sure an edge is near each, 0 without enough.
+    """
+    index = nearest.index[rows]
+    toward = found.normals[_closest(nearest, found, rows) if beside else rows]
+    cosine = np.abs(np.einsum("ikc,ic->ik", found.normals[index], toward))
+    weight = nearest.weight[rows] * np.maximum((cosine - SMOOTH) / (1.0 - SMOOTH), 0.0) ** POWER
+    count = weight.sum(axis=1) ** 2 / np.maximum((weight**2).sum(axis=1), 1e-300)
+    enough = count > _COEFFICIENTS
+    some = rows[enough]
+    fitted = fit_quadrics(nearest.points, index[enough], weight[enough], some, toward[enough])
+    left = fitted.misfit / (np.sqrt(1.0 - _COEFFICIENTS / count[enough]) * quadrics.misfit[some])
+    sharp = np.zeros(len(rows))
+    sharp[enough] = 1.0 - np.sqrt(np.minimum(left, 1.0))
+    return enough, fitted, sharp
 
 
 def _closest(nearest: Nearest, quadrics: Quadrics, rows: Ints) -> Ints:
