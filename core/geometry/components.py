@@ -5,7 +5,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from ..types import Bools, Floats, Ints
-from .nearest import COUNT, NEXT, ROW, Nearest
+from .nearest import COUNT, NEXT, Nearest
 
 _GAP = 2.0  # an edge longer than this many reaches to the 8th neighbour is a gap: more join clumps of outliers
 
@@ -22,8 +22,7 @@ def gap_reach(nearest: Nearest) -> Floats:
     Where the nearest eight lie along a row, but the neighbours do not, none of these lies across a gap.
     """
     reach = _GAP * nearest.distance[:, 1 : NEXT + 1][:, -1]  # of eight points there are seven neighbors
-    rows = np.flatnonzero(nearest.quadrics.roundness > ROW)
-    rows = rows[nearest.along_row(rows)]
+    rows = nearest.beside_rows
     reach[rows] = np.maximum(reach[rows], nearest.distance[rows, -1])
     return np.where(nearest.in_row, even_reach(nearest), reach)
 

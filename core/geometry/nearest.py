@@ -91,6 +91,13 @@ class Nearest:
         lined: Bools = roundness(np.linalg.eigvalsh(np.swapaxes(offset, 1, 2) @ offset)) < ROW
         return lined
 
+    @functools.cached_property
+    def beside_rows(self) -> Bools:
+        """Points whose nearest eight neighbours lie along a row, but the others beside it, (m,) bool; found once."""
+        result: Bools = self.quadrics.roundness > ROW
+        result[result] = self.along_row(np.flatnonzero(result))
+        return result
+
     def across(self, component: Ints) -> Bools:
         """Tell which points have neighbours of another component than their own, (m,) bool, by those, (m,) int."""
         return (component[self.index] != component[:, None]).any(axis=1)
