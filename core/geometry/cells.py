@@ -10,7 +10,7 @@ import numpy as np
 from ..algebra import blocks, on_all_cores
 from ..cores import cores
 from ..types import Bools, Floats, Ints, Report
-from .distances import arc_squared, bent_ways
+from .distances import arc_ahead, arc_squared, bent_ways
 from .nearest import COUNT, Nearest
 from .quadrics import CURVED, frames
 from .sheets import on_sheet
@@ -144,7 +144,7 @@ def _cuts(
     chord = nearest.points[index] - nearest.points[rows, None]
     cosine = np.einsum("ikc,ic->ik", there, here)
     left, right = np.einsum("ikc,ic->ik", chord, here), np.einsum("ikc,ikc->ik", chord, there)
-    squared, ahead = arc_squared(distance**2, left, right, cosine), (right - left) / 6.0
+    squared, ahead = arc_squared(distance**2, left, right, cosine), arc_ahead(left, right)
     if sides is not None:
         sure = np.maximum(sides.sharp[rows, None], sides.sharp[index])
         edged = np.nonzero(sure)

@@ -35,16 +35,25 @@ def arc_squared(squared: Floats, left: Floats, right: Floats, cosine: Floats | f
     return squared + (right - left) ** 2 * (1.0 / 12.0 + (1.0 - cosine) / 45.0) + (left + right) ** 2 / 20.0
 
 
+def arc_ahead(left: Floats, right: Floats) -> Floats:
+    """Return how much of the second normal, added to a chord, gives the direction of its arc at the first end.
+
+    It differs from the chord's by a third of the angle between the normals, to third order; for the heights see
+    `arc_squared`.
+    """
+    return (right - left) / 6.0
+
+
 def bent_ways(
     squared: Floats, left: Floats, right: Floats, cosine: Floats, turn: Floats, sharp: Floats
 ) -> tuple[Floats, Floats]:
     """Return the squared length of the shortest ways over chords where edges may lie between their ends, and a tilt.
 
     Over the edge in which two planes meet it has two legs: ``s^2 = r^2 - 2 d e / (1 + cosine)``. In the plane of the
-    first end its direction is that of the chord with ``-d / (1 + cosine)`` of the second normal added; that of an arc,
-    with ``(e - d) / 6``, as it starts off by a third of the angle between the normals. What the normals turn by more
-    than the surface bends is taken for an edge, as far as one is sure, and the rest for an arc; at a step, where both
-    ends see the other one on the same side, for an arc the more, the more they do.
+    first end its direction is that of the chord with ``-d / (1 + cosine)`` of the second normal added; for an arc see
+    `arc_ahead`. What the normals turn by more than the surface bends is taken for an edge, as far as one is sure, and
+    the rest for an arc; at a step, where both ends see the other one on the same side, for an arc the more, the more
+    they do.
 
     Parameters
     ----------
@@ -64,7 +73,8 @@ def bent_ways(
     share *= np.minimum(change**2 / np.maximum(left**2 + right**2, 1e-300), 1.0)
     open_ = np.maximum(1.0 + cosine, 1.0 - SMOOTH)
     legs, arc = squared - 2.0 * np.minimum(left * right, 0.0) / open_, arc_squared(squared, left, right, cosine)
-    return arc + share * (legs - arc), change / 6.0 - share * (left / open_ + change / 6.0)
+    ahead = arc_ahead(left, right)
+    return arc + share * (legs - arc), ahead - share * (left / open_ + ahead)
 
 
 def circle_arc(chord: Floats, sine: Floats) -> Floats:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..algebra import chebyshev_steps, inverses, on_all_cores
-from ..geometry import LARGEST, MET, TERMS, EdgeTerms, dots, frames, put_terms
+from ..geometry import LARGEST, MET, TERMS, EdgeTerms, arc_ahead, dots, frames, put_terms
 from ..kernel import SECOND_MOMENT
 from ..types import Floats, Ints, Report
 from .curvature import second_moment, uneven
@@ -134,8 +134,7 @@ class _Moments:
             ends, length = (patch.first, patch.second), distance[patch.pairs]
             chord, left, right = patch.second(places) - patch.first(places), patch.first(normals), patch.second(normals)
             right *= np.where(dots(left, right) < 0.0, -1.0, 1.0)
-            # The initial direction of the geodesic differs from the chord by its curvature, to third order.
-            change = (dots(chord, right) - dots(chord, left)) / 6.0
+            change = arc_ahead(dots(chord, left), dots(chord, right))
             at_edges: list[tuple[Ints, Any]] = []
             offsets = chord + change * right, change * left - chord
             for stored, end, offset in zip(self._offsets, ends, offsets, strict=True):

@@ -7,7 +7,7 @@ import numpy as np
 from scipy import sparse
 
 from ...algebra import blocks, on_all_cores
-from ...geometry import dots
+from ...geometry import arc_ahead, dots
 from ...operator import LaplaceBeltrami, tangent_frames
 from ...types import Array, Bools, Floats, Ints
 
@@ -206,8 +206,7 @@ def _fan(
     chord = places.take(end, axis=1) - places[:, rows].take(own, axis=1)
     here, there = normals[:, rows].take(own, axis=1), normals.take(end, axis=1)
     there *= np.where(dots(here, there) < 0.0, -1.0, 1.0)
-    # The direction of the arc at the point, from its chord and a third of the angle between the normals.
-    step = chord + (dots(chord, there) - dots(chord, here)) / 6.0 * there
+    step = chord + arc_ahead(dots(chord, here), dots(chord, there)) * there
     x, y = (dots(step, axis[:, rows].take(own, axis=1)) for axis in (right, ahead))
     size = np.hypot(x, y)
     # Coincident points lie in no direction, and have the same fans themselves.
