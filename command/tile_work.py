@@ -237,7 +237,7 @@ def workers(count, address):
             address = LocalCluster(
                 n_workers=count,
                 threads_per_worker=1,
-                dashboard_address="127.0.0.1:0",
+                dashboard_address="127.0.0.1:0",  # any free port: without an address Dask asks for the same one always
                 env={"MESHFREE_CORES": str(core.tiles.cores_of_worker(count))},
                 preload=[_IGNORE_STOP],
                 silence_logs=logging.CRITICAL,

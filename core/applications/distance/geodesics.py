@@ -23,9 +23,7 @@ _SQUARE = 0.1  # cosine of two normals below which they are nearly perpendicular
 _BLOCK = 1 << 16  # pairs worked on at one time, so that they stay in the cache
 _WITHIN = (1.5, 6.0, np.inf)  # straight distances within which a path between two points is searched, one by one
 _DETOUR = 1.25  # shortest path along pairs over the distance, at most
-_FILLED = (
-    1.05  # radii of its cell that a place of the surface is away from the nearest point, at most: else it is a gap
-)
+_FILLED = 1.05  # radii of its cell that a place of the surface is off the nearest point, at most: else it is a gap
 
 
 def geodesic_distance(laplacian: LaplaceBeltrami, sources: ArrayLike, *, progress: Progress | None = None) -> Floats:
