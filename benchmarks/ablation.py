@@ -28,6 +28,7 @@ from core.geometry import (
     quadrics,
     rows,
     sheets,
+    voids,
 )
 from core.operator import areas, curvature, images, stiffness, weights
 
@@ -54,6 +55,7 @@ MODULES = (
         noise,
         edges,
         boundary,
+        voids,
         cells,
         moments,
         bandwidth,
@@ -67,7 +69,8 @@ UNTUNED = {  # why a number is no constant: its names, with the module where oth
     "what is lost in rounding": ("_SAME", "_EVEN", "_SMALLEST", "_RIDGE", "_AT_BOUNDARY", "cells._CLOSEST", "NO_AREA"),
     "rounds after which an iteration has long ended": ("moments._STEPS", "edges._ROUNDS"),
     "how many terms there are": ("TERMS", "edges._COEFFICIENTS"),
-    "what only a notice or a drawing goes by": ("_NARROW", "bandwidth._STEPS", "cloud._DRAWN"),
+    "what only a notice or a drawing goes by": ("_NARROW", "bandwidth._STEPS", "cloud._DRAWN", "_TOLD"),
+    "what follows from others": ("HOLE",),
     "what the matrix does not go by": ("quadrics._FADING",),
 }
 DOCUMENT = Path(__file__).parents[1] / "docs" / "ablation.md"

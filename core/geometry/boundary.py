@@ -20,10 +20,12 @@ from .sheets import on_sheet
 
 _BLOCK = 1 << 13  # points looked at at one time
 _ANGLE = np.radians(100.0)  # widest angle without a neighbour, at least
-_PROBE, _EMPTY = 8.0, 0.6  # no point within 0.6 of 8 gaps of the place 8 gaps further out
+PROBE, _EMPTY = 8.0, 0.6  # no point within 0.6 of 8 gaps of the place 8 gaps further out
+HOLE = _EMPTY * PROBE  # gaps: radius of holes that are none by chance, whatever their shape
 _REACH = 20.0  # spacings from a boundary at which no kernel sees it
 _PART = 3  # of a short boundary no more than a third: a longer part of a square's has two corners
 _LEVEL = 1.45  # a boundary runs that many standard deviations outside the mean of its candidates
+VOID, SURE = 1.3, 1.6  # usual gaps that a place without a surface is from the next point, at least, and by itself
 _KINK = 2.0  # a fit to one side of a corner must scatter so many times less
 
 
@@ -50,6 +52,53 @@ class Boundary:
     def reached(self, lengths: Floats) -> Bools:
         """Tell from which points a kernel of these smoothing lengths reaches beyond the boundary, (m,) bool."""
         return self.distance[:, 0] < SUPPORT * lengths
+
+    def parting(self, tree: cKDTree, normals: Floats, first: Ints, second: Ints, gaps: Floats) -> Ints:
+        """Find the pairs of points between which the surface ends, and goes on after a gap, such as a slit.
+
+        From either end the other one lies beyond a boundary there, and halfway between both crossings the straight line
+        is well beyond both; or some place on the arc between them is near no point. Where neither end sees the other
+        beyond a boundary, as in the mouth of a slit, it has to be farther from all points.
+
+        Parameters
+        ----------
+        tree : cKDTree
+            Of the m points.
+        normals : ndarray, (m, 3)
+            Unit normals of any sign.
+        first, second : ndarray, (p,) int
+        gaps : ndarray, (m,)
+            How wide the gaps between points are.
+
+        Returns
+        -------
+        ndarray, (k,) int
+            Which of the pairs.
+        """
+        rows = np.flatnonzero(np.isfinite(np.minimum(self.distance[first, 0], self.distance[second, 0])))
+        chord = tree.data[second[rows]] - tree.data[first[rows]]
+        length = np.linalg.norm(chord, axis=1)
+        near = np.minimum(self.distance[first[rows], 0], self.distance[second[rows], 0]) < 0.5 * length
+        rows, chord, length = rows[near], chord[near], length[near]
+        first, second = first[rows], second[rows]
+        wide = 0.5 * (gaps[first] + gaps[second])
+        result, leaving = np.zeros((2, len(rows)), dtype=bool)
+        for side in (0, 1):
+            ahead, inside = np.einsum("ic,ic->i", chord, self.outward[first, side]), self.distance[first, side]
+            for other in (0, 1):
+                back, beyond = -np.einsum("ic,ic->i", chord, self.outward[second, other]), self.distance[second, other]
+                out = (ahead > inside) & (back > beyond)
+                leaving |= (ahead > inside) | (back > beyond)
+                share = np.where(out, 1.0 - inside / np.where(out, ahead, 1.0) - beyond / np.where(out, back, 1.0), 0.0)
+                result |= 0.5 * share * np.minimum(ahead, back) > 2.0 * ON * wide
+        wide = wide * np.where(leaving, VOID, SURE)
+        for place in (0.5, 0.375, 0.625, 0.25, 0.75):
+            left = np.flatnonzero(~result & (min(place, 1.0 - place) * length > wide))
+            ends = first[left], second[left]
+            rise = [normals[end] * np.einsum("ic,ic->i", chord[left], normals[end])[:, None] for end in ends]
+            there = tree.data[ends[0]] + place * chord[left] + 0.5 * place * (1.0 - place) * (rise[1] - rise[0])
+            result[left] = tree.query(there, workers=cores())[0] > wide[left]
+        return rows[result]
 
     def with_nearest(self, distance: Floats, spacing: Floats) -> Self:
         """Return the same with given distances to the nearest boundary, (m,), but for measured ones next to corners."""
@@ -106,16 +155,16 @@ def find_boundary(nearest: Nearest, oriented: Floats, gaps: Floats) -> Bools:
     if not len(rows):
         return result
     rows = rows[~_bends_away(nearest, oriented, rows)]
-    ahead = _PROBE * gaps[rows]
+    ahead = PROBE * gaps[rows]
     probe = points[rows] + ahead[:, None] * outward_directions(nearest, oriented, rows)
     distance, next_one = nearest.tree.query(probe, workers=cores())
     # What is nearest there may be sparser: then the surface goes on, as sparse as that.
-    rows = rows[distance > _EMPTY * np.maximum(ahead, _PROBE * gaps[next_one])]
+    rows = rows[distance > _EMPTY * np.maximum(ahead, PROBE * gaps[next_one])]
     if len(rows) < FEWEST:
         return result
-    label = _label_courses(points[rows], _PROBE * gaps[rows])
+    label = _label_courses(points[rows], PROBE * gaps[rows])
     length = np.bincount(label, nearest.spacing[rows] / gaps[rows])
-    result[rows] = length[label] >= 2.0 * np.pi * _EMPTY * _PROBE
+    result[rows] = length[label] >= 2.0 * np.pi * HOLE
     return result
 
 

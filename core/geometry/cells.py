@@ -36,10 +36,13 @@ class Cells:
     radius : ndarray, (m,)
         Distance of the furthest corner: the radius of the largest empty disc that touches the point. Half an even
         spacing or a little more; larger where points are irregular, or sparser in one direction than in the other.
+    corner : ndarray, (m, 3)
+        The way to it in the tangent plane, where that disc has its center.
     """
 
     areas: Floats
     radius: Floats
+    corner: Floats
 
 
 def measure_cells(
@@ -83,9 +86,9 @@ def measure_cells(
     count = len(normals)
     component = np.zeros(count, dtype=int) if component is None else component
     if before is None:
-        cells, rows = Cells(np.empty(count), np.empty(count)), np.arange(count)
+        cells, rows = Cells(np.empty(count), np.empty(count), np.empty((count, 3))), np.arange(count)
     else:
-        cells = Cells(before.areas.copy(), before.radius.copy())
+        cells = Cells(before.areas.copy(), before.radius.copy(), before.corner.copy())
         rows = np.flatnonzero(boundary.distance[:, 0] < np.maximum(nearest.distance[:, -1], before.radius))
     whole = ~np.any(nearest.apart, axis=1)  # no neighbour was left out: more of them can close a cell
     spacing = nearest.spacing
@@ -96,15 +99,17 @@ def measure_cells(
         def measure(part: slice, rows: Ints = rows, many: int = many, still_open: Bools = still_open) -> None:
             block = rows[part]
             cuts, furthest = _cuts(nearest, normals, gaussian_curvature, boundary, component, block, many, sides)
-            areas, radius, closed = _intersect(cuts, gaussian_curvature[block], 0.5 * furthest)
+            areas, corner, closed = _intersect(cuts, gaussian_curvature[block], 0.5 * furthest)
             known = np.flatnonzero(closed)
             if many == COUNT and not closed.all():
                 # Where a cell has no neighbour it ends one spacing off, as far as those of random points.
                 gaps = np.flatnonzero(~closed)
                 capped = np.concatenate([cuts[gaps], _caps(cuts[gaps], 1.0 / spacing[block[gaps]])], axis=1)
-                areas[gaps], radius[gaps], _ = _intersect(capped, gaussian_curvature[block[gaps]], np.inf)
+                areas[gaps], corner[gaps], _ = _intersect(capped, gaussian_curvature[block[gaps]], np.inf)
                 known = np.arange(len(block))
-            cells.areas[block[known]], cells.radius[block[known]] = areas[known], radius[known]
+            cells.areas[block[known]], cells.radius[block[known]] = areas[known], np.linalg.norm(corner[known], axis=1)
+            along = frames(normals[block[known]])[:, :, 1:]
+            cells.corner[block[known]] = np.einsum("ick,ik->ic", along, corner[known])
             still_open[block] = ~closed & (whole[block] | (many < COUNT))
 
         on_all_cores(measure, blocks(len(rows), _BLOCK * COUNT // max(many, COUNT)), report)
@@ -171,7 +176,7 @@ def _caps(cuts: Floats, size: Floats) -> Floats:
 
 
 def _intersect(cuts: Floats, gaussian_curvature: Floats, furthest: Floats | float) -> tuple[Floats, Floats, Bools]:
-    """Return the area inside all cuts, its radius, and whether it is closed and no larger, (k,) each.
+    """Return the area inside all cuts, (k,), its furthest corner, (k, 2), and whether it is closed and no larger, (k,).
 
     Its corners are the edges of the convex hull of the cuts, which is wrapped around the origin from the longest cut
     on; an edge that ends in the origin is open.
@@ -183,8 +188,8 @@ def _intersect(cuts: Floats, gaussian_curvature: Floats, furthest: Floats | floa
     here = np.stack([x[rows, longest], y[rows, longest]])
     first, same = here, _SAME * np.hypot(*here)
     ahead = np.stack([-here[1], here[0]])
-    areas, radius = np.zeros(count), np.zeros(count)
-    closed = np.zeros(count, dtype=bool)
+    areas, closed = np.zeros(count), np.zeros(count, dtype=bool)
+    radius, farthest = np.zeros(count), np.zeros((count, 2))
     start = corner = np.zeros((2, 0))
     for _ in range(x.shape[1] + 1):
         step_x, step_y = x - here[0, :, None], y - here[1, :, None]
@@ -200,7 +205,9 @@ def _intersect(cuts: Floats, gaussian_curvature: Floats, furthest: Floats | floa
         out = across <= _SAME * np.hypot(*here) * np.hypot(*there)
         before = corner
         corner = np.stack([there[1] - here[1], here[0] - there[0]]) / np.where(out, 1.0, across)
-        radius[rows] = np.maximum(radius[rows], np.where(out, 0.0, np.hypot(*corner)))
+        away = np.where(out, 0.0, np.hypot(*corner))
+        further = away > radius[rows]
+        radius[rows[further]], farthest[rows[further]] = away[further], corner.T[further]
         if not before.size:
             start = corner
         else:
@@ -215,7 +222,7 @@ def _intersect(cuts: Floats, gaussian_curvature: Floats, furthest: Floats | floa
             here, ahead, corner, start, first = (values[:, left] for values in (here, ahead, corner, start, first))
         if not len(rows):
             break
-    return areas, radius, closed & (radius < furthest)
+    return areas, farthest, closed & (radius < furthest)
 
 
 def _triangles(corner: Floats, other: Floats, gaussian_curvature: Floats) -> Floats:

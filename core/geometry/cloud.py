@@ -37,6 +37,7 @@ from .quadrics import MANY, Quadrics, check_surface, count_curves, frames
 from .rounding import smooth_rounded
 from .rows import look_across_rows
 from .sheets import Sheets, fit_sheets, label_sheets, separate_sheets
+from .voids import find_voids, no_voids
 from .winding import orient_by_winding
 
 _DRAWN = 20  # points that a surface needs at least, to be drawn
@@ -244,21 +245,29 @@ def measure_surface(
     report("Neighbors", 0.2)
     gaussian = quadrics.gaussian_curvature
     sides = one_side(quadrics, oriented) if given is not None else find_sides(nearest, quadrics).toward(oriented)
-    gaps, edge = None, no_boundary(len(oriented))
 
     def cells_within(boundary: Boundary, before: Cells | None = None) -> Cells:
         reported = functools.partial(report, "Neighbors", 0.2)
         return measure_cells(nearest, sides.normals, gaussian, boundary, sample.component, reported, before, sides)
 
-    cells = cells_within(edge)
-    if options.boundary == "auto" and boundary is None and boundary_distance is None:
-        gaps = mean_gaps(nearest, cells.radius, 1)
-    edge = locate_boundary(sample, oriented, gaps, boundary, boundary_distance)
+    cells = cells_within(no_boundary(len(oriented)))
+    gaps = mean_gaps(nearest, cells.radius, 1)
+    found = options.boundary == "auto" and boundary is None and boundary_distance is None
+    edge = locate_boundary(sample, oriented, gaps if found else None, boundary, boundary_distance)
     if np.isfinite(edge.distance).any():
+        cells = cells_within(edge, cells)
+    voids = find_voids(nearest, cells, gaps, sample.scatter[1]) if found else no_voids()
+    if len(voids.rims):
+        edge = measure_boundary(nearest, oriented, as_mask(voids.rims, len(oriented)) | edge.at_boundary)
         cells = cells_within(edge, cells)
     report("Neighbors", 0.25)
     lengths = smoothing_lengths(nearest, oriented, quadrics, cells, edge, options, sample.component, decisions)
     pairs = Pairs(nearest.points, lengths, *find_pairs(nearest.tree, lengths, lambda: report("Neighbors", 0.3)))
+    parted = edge.parting(nearest.tree, sides.normals, pairs.first, pairs.second, gaps)
+    if len(parted):
+        joined = np.ones(len(pairs.first), dtype=bool)
+        joined[parted] = False
+        pairs = pairs.keep(joined)
     own = oriented if given is None else given
 
     report("Neighbors", 0.4)
@@ -294,7 +303,8 @@ def measure_surface(
             neighbors=options.neighbors,
             short=0 if options.bandwidth == "adaptive" else _too_few(sample.component, options.neighbors),
             narrow=bool(np.mean(lengths > _NARROW * depth(nearest, edge.distance)) > MANY),
-        ),
+        )
+        + voids.notices(sample, edge.at_boundary),
     )
 
 

@@ -95,9 +95,10 @@ def test_without_neighbors_a_cell_ends_a_spacing_away():
 
 
 def test_a_point_that_no_neighbor_cuts_has_no_closed_cell():
-    areas, radius, closed = _intersect(np.zeros((1, 6, 2)), np.zeros(1), np.inf)
+    areas, corner, closed = _intersect(np.zeros((1, 6, 2)), np.zeros(1), np.inf)
     assert not closed.any()
-    assert areas.tolist() == radius.tolist() == [0.0]
+    assert areas.tolist() == [0.0]
+    assert corner.tolist() == [[0.0, 0.0]]
 
 
 def test_trust_is_low_where_the_points_do_not_tell():
