@@ -7,7 +7,7 @@ import numpy as np
 from ..algebra import blocks, on_all_cores
 from ..types import Bools, Floats, Ints
 from .components import label_connected
-from .nearest import NEXT, ROW, Nearest, fading_weights
+from .nearest import NEXT, ROW, SMOOTH, Nearest, fading_weights
 from .quadrics import fit_quadrics
 
 _WIDER = 16  # times the 40 neighbours are looked at: the next row may be a hundred times as far as the next point
@@ -48,8 +48,12 @@ def look_across_rows(nearest: Nearest) -> Nearest:
         beside = label[other] != label[block, None]
         alone[part] = ~beside.any(axis=1)
         offset = nearest.points[other] - nearest.points[block, None]
-        every = np.arange(len(block))
-        sector = _sectors(offset, offset[:, NEXT], offset[every, beside.argmax(axis=1)])
+        along, every = offset[:, NEXT], np.arange(len(block))
+        # Where points farther along the row do not crowd, they are none of it, but not beside it either.
+        turned = np.abs(np.einsum("ikc,ic->ik", offset, along)) < SMOOTH * far * far[:, [NEXT]]
+        across = (beside & turned).any(axis=1)
+        beside[across] &= turned[across]
+        sector = _sectors(offset, along, offset[every, beside.argmax(axis=1)])
         sector[:, 0] = NEXT  # the point itself
         chosen = np.argsort(_ranks(sector), axis=1, kind="stable")[:, : index.shape[1]]
         chosen.sort(axis=1)

@@ -63,8 +63,8 @@ def test_a_cube_has_its_area():
 
 
 def test_points_on_edges_have_cells_on_both_sides():
-    # A third of the points lie on the edges, where the normal is that of either face.
-    points, count = random_cube(3000)[0], 1500
+    # A fifth of the points lie on the edges, where the normal is that of either face.
+    points, count = random_cube(6000)[0], 1500
     places, rng = np.random.default_rng(1).random(count), np.random.default_rng(2)
     edges = rng.integers(2, size=(count, 3)).astype(float)
     edges[np.arange(count), rng.integers(3, size=count)] = places

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import core
-from benchmarks.samplings import grid_points, random_sphere
+from benchmarks.samplings import grid_points, random_sphere, torus_eigenvalues
 from core.geometry.nearest import find_nearest
 from core.geometry.rows import look_across_rows
 
@@ -47,6 +47,20 @@ def test_a_surface_in_rows_is_measured(cloud, at_boundary):
     assert laplacian.areas.sum() == pytest.approx(area, rel=2e-3)
     assert np.all(laplacian.component == 0)
     assert np.count_nonzero(laplacian.boundary) == at_boundary
+
+
+@pytest.mark.parametrize("minor", [0.35, 0.4, 0.526])
+def test_circles_that_come_nearer_to_each_other_are_measured(minor):
+    """Points crowd along them outside the torus's ring, and no more within it."""
+    around, tube = (2.0 * np.pi * np.arange(count) / count for count in (40, 160))
+    radius = 1.0 + minor * np.cos(tube)
+    flat = [radius[:, None] * np.cos(around), radius[:, None] * np.sin(around)]
+    points = np.stack([*flat, np.repeat(minor * np.sin(tube)[:, None], 40, axis=1)], axis=-1).reshape(-1, 3)
+    laplacian = core.build_laplacian(points)
+    exact = np.repeat(4.0 * np.pi**2 * minor * radius / (40 * 160), 40)
+    np.testing.assert_allclose(laplacian.areas / exact, 1.0, atol=0.15)
+    values = laplacian.eigenpairs(21).eigenvalues[1:] / torus_eigenvalues(21, 1.0, minor)[1:]
+    assert np.abs(values - 1.0).mean() < 6e-3
 
 
 @pytest.mark.parametrize("across", [7, 8, 9, 9.7, 10])
