@@ -36,15 +36,18 @@ def find_outliers(nearest: Nearest, usual: float | None = None) -> Bools:
     """
     usual = float(np.median(nearest.spacing)) if usual is None else usual
     surface, result = nearest.quadrics, np.zeros(len(nearest.points), dtype=bool)
-    alone = Alone(nearest, surface)
+    alone, height = Alone(nearest, surface), third_heights(nearest, surface, np.arange(len(result)))
     # The first search finds most outliers, each further one those that they had hidden.
-    while (new := _off_surface(nearest, surface, alone, result, usual) & ~result).any():
+    while (new := _off_surface(nearest, surface, alone, height, result, usual) & ~result).any():
         result |= new
         # The quadrics around them go on without them.
-        rows = np.flatnonzero(new[nearest.index].any(axis=1))
+        changed = new[nearest.index].any(axis=1)
+        rows = np.flatnonzero(changed)
         nearest = nearest.keep(~result[nearest.index])
         surface = surface.put(rows, fit_quadrics(nearest.points, nearest.index[rows], nearest.weight[rows], rows))
         alone.forget(rows)
+        over = np.flatnonzero(changed[nearest.index].any(axis=1))
+        height[over] = third_heights(nearest, surface, over)
     return result
 
 
@@ -67,12 +70,13 @@ class Alone:
         self._known[rows] = True
 
 
-def _off_surface(nearest: Nearest, surface: Quadrics, alone: Alone, known: Bools, usual: float) -> Bools:
-    """Tell which points lie off the surface, those that are known to among them, (m,) bool."""
+def _off_surface(
+    nearest: Nearest, surface: Quadrics, alone: Alone, height: Floats, known: Bools, usual: float
+) -> Bools:
+    """Tell which points lie off the surface, by `third_heights`, those that are known to among them, (m,) bool."""
     spacing, result = nearest.spacing, known.copy()
-    off = third_least(heights_over_witnesses(nearest, surface, np.arange(len(spacing))))
     sparse = spacing > GAP * usual  # their witnesses must show a surface that thin
-    suspects = np.flatnonzero(~known & ((off > ON * spacing) | (sparse & (surface.misfit > ON * spacing))))
+    suspects = np.flatnonzero(~known & ((height > ON * spacing) | (sparse & (surface.misfit > ON * spacing))))
     if not len(suspects):
         return result
     witnesses = witnesses_of(nearest, suspects)
@@ -96,6 +100,11 @@ def witnesses_of(nearest: Nearest, rows: Ints) -> Ints:
 def third_least(values: Floats) -> Floats:
     """Return the third least of each row."""
     return np.partition(values, AGREEING - 1, axis=1)[:, AGREEING - 1]
+
+
+def third_heights(nearest: Nearest, surface: Quadrics, rows: Ints) -> Floats:
+    """Return the third least height of some points over the quadrics of their witnesses, (k,)."""
+    return third_least(heights_over_witnesses(nearest, surface, rows))
 
 
 def heights_over_witnesses(nearest: Nearest, surface: Quadrics, rows: Ints) -> Floats:

@@ -6,7 +6,7 @@ from ..types import Bools, Floats, Ints, Report
 from .components import even_reach, label_connected
 from .nearest import AGREEING, FEW, GAP, ON, Nearest
 from .noise import FILLING
-from .outliers import SCATTERS, Alone, heights_over_witnesses, third_least, witnesses_of
+from .outliers import SCATTERS, Alone, heights_over_witnesses, third_heights, third_least, witnesses_of
 from .quadrics import fit_quadrics
 from .rows import look_across_rows
 
@@ -53,13 +53,17 @@ def stray_scores(nearest: Nearest, report: Report = lambda: None) -> Floats:
     third = nearest.distance[:, min(_NEAR, nearest.distance.shape[1] - 1)]
     sparse, sparsest = spacing > _SPARSE * around, spacing > GAP * np.median(spacing)
     off, before = third > _LONELY * around, np.zeros(len(spacing), dtype=bool)
-    lonely = off
+    lonely, over_all, alone = off, third_heights(nearest, surface, np.arange(len(off))), Alone(nearest, surface)
     for _ in range(_ROUNDS):
         report()
-        clean, rows = nearest.keep(~off[nearest.index]), np.flatnonzero((off != before)[nearest.index].any(axis=1))
+        changed = (off != before)[nearest.index].any(axis=1)
+        clean, rows = nearest.keep(~off[nearest.index]), np.flatnonzero(changed)
         surface = surface.put(rows, fit_quadrics(clean.points, clean.index[rows], clean.weight[rows], rows))
         clean = clean.with_quadrics(surface)
-        height = _heights(clean, sparse, sparsest, off, lonely)
+        alone.forget(rows)
+        over = np.flatnonzero(changed[nearest.index].any(axis=1))
+        over_all[over] = third_heights(clean, surface, over)
+        height = _heights(clean, alone, over_all > _ON * spacing, sparse, sparsest, off, lonely)
         before, off = off, height > 1.0
         if (off == before).all():
             break
@@ -95,13 +99,14 @@ def _loneliness(nearest: Nearest, off: Bools) -> Floats:
     return result
 
 
-def _heights(clean: Nearest, sparse: Bools, sparsest: Bools, off: Bools, lonely: Bools) -> Floats:
+def _heights(
+    clean: Nearest, alone: Alone, rough: Bools, sparse: Bools, sparsest: Bools, off: Bools, lonely: Bools
+) -> Floats:
     """Return the heights, (m,), over what counts as on the surface, by quadrics without the points off it so far."""
     spacing, surface, result = clean.spacing, clean.quadrics, np.zeros(len(off))
     roughness = np.quantile((surface.misfit / spacing)[~off], 0.75) if not off.all() else 0.0
-    rough = third_least(heights_over_witnesses(clean, surface, np.arange(len(off)))) > _ON * spacing
     suspects = np.flatnonzero(off | lonely | rough | (sparsest & (surface.misfit > ON * spacing)))
-    witnesses, alone = witnesses_of(clean, suspects), Alone(clean, surface)
+    witnesses = witnesses_of(clean, suspects)
     alone.fit(clean, surface, np.unique(witnesses))
     scatter = alone.scatter[witnesses]
     height = heights_over_witnesses(clean, alone.surface, suspects)
