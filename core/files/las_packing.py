@@ -14,6 +14,7 @@ _CHUNKED, _LAYERED = 2, 3  # kinds of compression
 # Items of a compressed point by number: bytes, and layers if there are any. Others are extra bytes, a layer for each.
 _ITEMS = {6: (20, 0), 7: (8, 0), 8: (6, 0), 9: (29, 0), 10: (30, 9), 11: (6, 1), 12: (8, 2), 13: (29, 1)}
 _EXTRA = (0, 14)
+_LATEST = 3  # version of these that lazrs reads
 
 
 class PackedChunk(NamedTuple):
@@ -69,14 +70,17 @@ def _check_packing(file: BinaryIO, begin: int, size: int, header: Any, path: Pat
 
     found = [detail.record_data for detail in header.vlrs.get("LasZipVlr")]
     kind, items = (0, []) if not found else _read_items(found[0])
-    wanted = [size for number, size in items if number in _ITEMS and _ITEMS[number][0] != size]
+    wanted = [size for number, size, _ in items if number in _ITEMS and _ITEMS[number][0] != size]
     if (
         kind not in (_CHUNKED, _LAYERED)
         or wanted
-        or sum(size for _, size in items) != header.point_format.size
-        or any(number not in _ITEMS and number not in _EXTRA for number, _ in items)
+        or sum(size for _, size, _ in items) != header.point_format.size
+        or any((number not in _ITEMS and number not in _EXTRA) or version > _LATEST for number, _, version in items)
     ):
-        raise InvalidPointsError(f"{path} uses an unknown compression, or is corrupted. Save it again as LAS.")
+        raise InvalidPointsError(
+            f"{path} uses an unknown compression. Save it again as LAS by the program that it is from; or it is"
+            " corrupted: copy it again."
+        )
     fault = InvalidPointsError(f"{path} is broken: its compressed points do not match its header. Copy it again.")
 
     def read(code: str, place: int) -> tuple[int, ...]:
@@ -94,7 +98,7 @@ def _check_packing(file: BinaryIO, begin: int, size: int, header: Any, path: Pat
         raise fault
     file.seek(begin)
     place, left, result = begin + 8, header.point_count, []
-    layers = sum(_ITEMS[number][1] if number in _ITEMS else length for number, length in items)
+    layers = sum(_ITEMS[number][1] if number in _ITEMS else length for number, length, _ in items)
     for count, length in lazrs.read_chunk_table(file, lazrs.LazVlr(found[0])):
         if left <= 0:
             break  # writers may begin a chunk at the end that gets no points
@@ -112,6 +116,6 @@ def _check_packing(file: BinaryIO, begin: int, size: int, header: Any, path: Pat
 
 
 def _read_items(data: bytes) -> tuple[int, list[tuple[int, ...]]]:
-    """Return the kind of compression, and number and bytes of each item of a point."""
+    """Return the kind of compression, and number, bytes and version of each item of a point."""
     (kind,), (count,) = struct.unpack_from("<H", data), struct.unpack_from("<H", data, 32)
-    return kind, [struct.unpack_from("<HH", data, 34 + 6 * index) for index in range(count)]
+    return kind, [struct.unpack_from("<HHH", data, 34 + 6 * index) for index in range(count)]
