@@ -75,7 +75,7 @@ def add_one_file(parser):
         "--one-file",
         type=Path,
         metavar="FILE",
-        help=f"write the results of all tiles to one file, too: {', '.join(_one_file_endings())}",
+        help=f"write the results of all tiles to one file, too: {', '.join(core.files.WRITABLE)}",
     )
 
 
@@ -84,11 +84,7 @@ def check_one_file(parser, arguments, read):
     path = arguments.one_file
     if path is None:
         return
-    if path.suffix.lower() not in _one_file_endings():
-        parser.error(f"--one-file must end in {', '.join(_one_file_endings())}")
+    if path.suffix.lower() not in core.files.WRITABLE:
+        parser.error(f"--one-file must end in {', '.join(core.files.WRITABLE)}")
     if path.resolve() in {other.resolve() for other in read}:
         parser.error(f"--one-file would overwrite {path}, which is read")
-
-
-def _one_file_endings():
-    return (*core.files.WRITABLE, *core.files.SCANS)

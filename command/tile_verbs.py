@@ -127,7 +127,8 @@ def _cut(sources, folder, most, options, known, choices, progress):
         yield from sources(lambda share: progress("Read", begin + 0.5 * share))  # twice
         begin = 0.5
         broken = {str(path): str(error) for path, error in sources.broken.items()}
-        known.update({"full color": sources.full, "notices": sources.notices, "broken": broken})
+        las = None if sources.las is None else sources.las.to_json()
+        known.update({"full color": sources.full, "las": las, "notices": sources.notices, "broken": broken})
 
     progress("Read", 0.0)
     return core.tiles.cut_to_store(chunks, folder, most, options, known=known, **choices)

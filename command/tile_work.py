@@ -59,6 +59,8 @@ class Sources:
         Of the last time that they were read.
     full : float
         The number of a full color in them; zero if they have none.
+    las : LasForm or None
+        What those of LAS state besides.
     broken : dict of pathlib.Path to PointCloudError
         The files that cannot be read, and why. They are left out.
     """
@@ -72,7 +74,8 @@ class Sources:
         }
         self._sizes = {path: path.stat().st_size if path.is_file() else 0 for path in paths}
         self._counts = {}  # of points, as far as known
-        self.notices, self.full, self.broken = [], 0.0, {}
+        self.notices, self.full, self.las, self.broken = [], 0.0, None, {}
+        self._forms = {}
 
     def __call__(self, progress):
         """Yield points, and their other numbers.
@@ -116,9 +119,11 @@ class Sources:
         if len(self.broken) == len(self._sizes):
             raise next(iter(self.broken.values()))
         left_out = [f"Left out a file: {error}" for error in self.broken.values()]
-        self.notices = core.files.join_notices([*self.notices, *left_out])
         found = np.concatenate(channels)
         self.full = core.files.full_color(found) if len(found) else 0.0
+        forms = [form for path, form in self._forms.items() if path not in self.broken]
+        self.las, differing = core.files.join_forms(forms, self.full)
+        self.notices = core.files.join_notices([*self.notices, *left_out, *differing])
 
     def _pieces(self, path):
         """Yield the points of a file, and note what is to be told of it."""
@@ -131,6 +136,7 @@ class Sources:
             corners = [*corners, points.min(axis=0), points.max(axis=0)]
             corners = [np.min(corners, axis=0), np.max(corners, axis=0)]
             yield points, columns
+        self._forms[path] = pieces.las
         notices = list(pieces.notices)
         if corners:
             table = core.files.PointTable(np.stack(corners), single=pieces.single, degrees=pieces.degrees)
@@ -181,7 +187,9 @@ def _table(store, number, smoothed):
         vectors = store.read("modes", number, "modes").T
         measures |= {eigenvector_name(place): vector for place, vector in enumerate(vectors, 1)}
     points = found["surface_points"] if smoothed else store.own(number)
-    return clouds.with_results(core.files.PointTable(points, columns, colors), measures)
+    stated = store.manifest.get("las")
+    las = None if stated is None else core.files.LasForm(**stated)
+    return clouds.with_results(core.files.PointTable(points, columns, colors, las=las), measures)
 
 
 def doubts(store):

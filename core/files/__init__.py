@@ -16,6 +16,7 @@ from .formats import (
 )
 from .frames import frame_number, numbered_files, order_frames
 from .las_choices import LasChoices, parse_classes
+from .las_form import LasForm, join_forms
 from .lines import brief
 from .mesh import MESHES, write_mesh
 from .notices import join_notices

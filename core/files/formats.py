@@ -4,7 +4,7 @@ import os
 import struct
 import zipfile
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -16,13 +16,13 @@ from .arrays import read_array
 from .e57 import read_e57
 from .las import read_las
 from .las_choices import LasChoices
-from .las_writing import write_las
+from .las_writing import FULL, write_las
 from .lines import brief
 from .origin import look_like_degrees
 from .pcd import read_pcd
 from .ply import read_ply, write_vertex_pieces
 from .ptx import read_ptx
-from .ranges import ColumnPieces
+from .ranges import Columns
 from .table import PointTable, check_places, to_columns, without_missed
 from .text import read_columns, read_scan, read_vertices, write_columns
 from .whole import replacing
@@ -50,7 +50,7 @@ _READERS = {
 SCANS = (".las", ".laz")
 READABLE = tuple(_READERS)
 TEXTS = tuple(suffix for suffix, read in _READERS.items() if read in (read_columns, read_scan))  # rows of columns
-WRITABLE = (".ply", ".xyz", ".csv")
+WRITABLE = (".ply", ".xyz", ".csv", *SCANS)
 SPLATS = (".splat", ".spz")  # of Gaussian splats alone, which core.splats reads
 
 
@@ -162,19 +162,18 @@ def write_points(path: Path, table: PointTable, double: bool = True) -> list[str
     path : pathlib.Path
     table : PointTable
     double : bool
-        Whether coordinates are kept in double precision.
+        Whether coordinates are kept in double precision, as always in LAS and LAZ.
 
     Returns
     -------
     list of str
         Notices of differences between what was given and what is written.
     """
-    columns = to_columns(table, double)
-    return _write(path, lambda: [columns], WRITABLE)
+    return _write(path, lambda: [table], double)
 
 
 def write_pieces(path: Path, tables: Callable[[], Iterable[PointTable]]) -> list[str]:
-    """Write tables one after the other to a file of one of the kinds in `WRITABLE` or `SCANS`.
+    """Write tables one after the other to a file of one of the kinds in `WRITABLE`.
 
     Memory is that of one of them. An older file stays if it fails.
 
@@ -203,16 +202,22 @@ def write_pieces(path: Path, tables: Callable[[], Iterable[PointTable]]) -> list
     []
     800
     """
-    return _write(path, lambda: (to_columns(table) for table in tables()), (*WRITABLE, *SCANS))
+    return _write(path, tables)
 
 
-def _write(path: Path, pieces: ColumnPieces, kinds: Sequence[str]) -> list[str]:
+def _write(path: Path, tables: Callable[[], Iterable[PointTable]], double: bool = True) -> list[str]:
     suffix = path.suffix.lower()
-    if suffix not in kinds:
-        raise PointCloudError(f"Points cannot be written to {path}. Give it one of {', '.join(kinds)}.")
+    if suffix not in WRITABLE:
+        raise PointCloudError(f"Points cannot be written to {path}. Give it one of {', '.join(WRITABLE)}.")
+    form = next(iter(tables())).las if suffix in SCANS else None
+    full = FULL if suffix in SCANS else 255.0
+
+    def pieces() -> Iterator[Columns]:
+        return (to_columns(table, double or suffix in SCANS, full if form is None else form.full) for table in tables())
+
     with replacing(path) as temporary:
         if suffix in SCANS:
-            return write_las(temporary, pieces, path.name)
+            return write_las(temporary, pieces, path.name, form)
         if suffix == ".ply":
             return write_vertex_pieces(temporary, pieces)
         write_columns(temporary, pieces, "," if suffix == ".csv" else " ")

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
@@ -11,13 +12,28 @@ from ..errors import PointCloudError, TooFewPointsError
 from ..types import Array, Bools, Floats
 from .copc import Box, Octree, read_octree, records_of
 from .las_choices import LasChoices
+from .las_form import LasForm, read_form
 from .las_packing import PackedChunk, check_header, check_size
 from .reference import Reference, read_reference
 from .rows import too_short
-from .table import CHANNELS, PointTable, color_by
+from .table import CHANNELS, NORMAL, NORMALS, PointTable, color_by, full_color, normal_names, take_normals
 
-_TIMES = "gps_time"
-_COLUMNS = ("intensity", "classification", "return_number", "nir", _TIMES)  # that become attributes, if they exist
+_COLUMNS = ("intensity", "classification", "return_number", "nir")  # that become attributes, if they exist
+_OPTIONAL = (  # and these, unless they are zero everywhere, which stands for none
+    "gps_time",
+    "number_of_returns",
+    "scan_direction_flag",
+    "edge_of_flight_line",
+    "synthetic",
+    "key_point",
+    "overlap",
+    "scanner_channel",
+    "scan_angle_rank",
+    "scan_angle",
+    "user_data",
+    "point_source_id",
+)
+_WAVEFORMS = "wavepacket_index"
 _COLORS = CHANNELS[:3]
 _WITHHELD = "withheld"
 _NUMBERS = (1, 3)  # of a column that becomes an attribute
@@ -60,32 +76,48 @@ class LasFile(NamedTuple):
 
     def names(self, withheld: bool = False) -> list[str]:
         """Return the names of the other numbers of a point, those of the flag among them if it is asked for."""
-        return [*self._sources(withheld)]
+        names = [*self._sources(withheld)]
+        normals = normal_names(names)
+        return [*(name for name in names if name not in normals), *([NORMAL] if normals else [])]
 
     def columns(self, block: Any, kept: Bools | slice, withheld: bool = False) -> dict[str, Array]:
         """Return the other numbers of points by name: red, green and blue, and those that become attributes."""
         columns = {name: np.asarray(block[source])[kept] for name, source in self._sources(withheld).items()}
         if withheld:
             columns[_WITHHELD] = columns[_WITHHELD].astype(np.uint8)
-        return columns
+        return columns | take_normals(columns)
 
     def _sources(self, withheld: bool) -> dict[str, str]:
         """Return laspy's names of what is read, by ours."""
-        layout = self.reader.header.point_format
-        known = set(layout.dimension_names)
-        extra = [item.name for item in layout.extra_dimensions if item.num_elements in _NUMBERS]
-        names = [*(_COLORS if known.issuperset(_COLORS) else ()), *(name for name in _COLUMNS if name in known), *extra]
-        sources = {" ".join(name.split()) or "extra": name for name in names}
-        return {**sources, _WITHHELD: _WITHHELD} if withheld else sources
+        known = set(self.reader.header.point_format.standard_dimension_names)
+        colors = _COLORS if known.issuperset(_COLORS) else ()
+        names = [*colors, *(name for name in (*_COLUMNS, *_OPTIONAL) if name in known)]
+        extra = {name: item.name for name, item in self._extras.items()}
+        return {**dict(zip(names, names, strict=True)), **extra, **({_WITHHELD: _WITHHELD} if withheld else {})}
+
+    @property
+    def _extras(self) -> dict[str, Any]:
+        """The extra bytes that are read, by our names."""
+        extra = self.reader.header.point_format.extra_dimensions
+        return {" ".join(item.name.split()) or "extra": item for item in extra if item.num_elements in _NUMBERS}
+
+    def form(self, las: LasChoices) -> LasForm:
+        """Return what the file states besides, in the unit that is read."""
+        extras = self._extras
+        normals = dict(zip(normal_names(extras), NORMALS, strict=False))  # as `to_columns` names them
+        named = {normals.get(name, name): item for name, item in extras.items()}
+        return read_form(self.reader.header, named).scaled(self.scale(las))
 
     def left_out(self) -> list[str]:
         """Report the columns that are not read."""
-        extra = self.reader.header.point_format.extra_dimensions
-        return [
-            f"{self.path.name}: left out {item.name}, which has {item.num_elements} numbers per point."
-            for item in extra
-            if item.num_elements not in _NUMBERS
-        ]
+        layout, name = self.reader.header.point_format, self.path.name
+        extra = [item for item in layout.extra_dimensions if item.num_elements not in _NUMBERS]
+        notices = [f"{name}: left out {item.name}, which has {item.num_elements} numbers per point." for item in extra]
+        if _WAVEFORMS in layout.standard_dimension_names:
+            notices.append(
+                f"{name}: left out the waveforms of its points, {_WAVEFORMS} to z_t. Use the file itself for these."
+            )
+        return notices
 
     def is_geographic(self, points: Floats) -> bool:
         """Whether coordinates, (n, 3), are longitude and latitude: the file states it, and they are not too large."""
@@ -124,7 +156,7 @@ def opened_las(path: Path) -> Iterator[LasFile]:
 
 
 def read_las(path: Path, las: LasChoices = LasChoices()) -> PointTable:
-    """Read a LAS or LAZ file: coordinates, intensity, class, return, colors and extra dimensions.
+    """Read a LAS or LAZ file: coordinates, colors, all other columns of its format but waveforms, and extra dimensions.
 
     Points that are flagged as withheld are left out, unless they are chosen, as are those of classes that are not.
 
@@ -135,7 +167,7 @@ def read_las(path: Path, las: LasChoices = LasChoices()) -> PointTable:
     """
     with opened_las(path) as file:
         count, tally, done = file.reader.header.point_count, Tally(las), 0
-        table = PointTable(np.empty((count, 3)), notices=file.left_out())
+        table = PointTable(np.empty((count, 3)), notices=file.left_out(), las=file.form(las))
         for points, columns in las_pieces(file, tally, _BLOCK):
             rows = slice(done, done + len(points))
             table.points[rows] = points
@@ -153,16 +185,19 @@ def read_las(path: Path, las: LasChoices = LasChoices()) -> PointTable:
 
 
 def settle_columns(table: PointTable, path: Path, channels: Sequence[str] = CHANNELS) -> None:
-    """Drop times that are all zero from the attributes of a table, and color it by some of these, unless all are black.
+    """Drop columns that are zero everywhere from the attributes of a table, and color it by some, unless all are black.
 
-    Both stand for none: programs write zeros where they have no times, and scanners without a camera black.
+    Both stand for none: programs write zeros where they have no times or flags, and scanners without a camera black.
     """
-    if not table.attributes.get(_TIMES, np.ones(1)).any():
-        del table.attributes[_TIMES]
+    for name in _OPTIONAL:
+        if not table.attributes.get(name, np.ones(1)).any():
+            del table.attributes[name]
     if table.attributes.keys() >= set(_COLORS):
         found = {name: table.attributes.pop(name) for name in channels if name in table.attributes}
         if any(found[name].any() for name in _COLORS):
             color_by(table, found, path)
+            if table.las is not None:
+                table.las = replace(table.las, full=full_color(np.array([found[name].max() for name in _COLORS])))
 
 
 def las_pieces(

@@ -15,6 +15,7 @@ from .e57 import e57_scans
 from .formats import SCANS, TEXTS, check_columns, doubts, read_points, reading
 from .las import Tally, las_pieces, opened_las, settle_columns
 from .las_choices import LasChoices
+from .las_form import LasForm
 from .ply import ply_pieces
 from .ptx import ptx_pieces
 from .table import CHANNELS, Missed, PointTable, check_places, full_color
@@ -61,6 +62,8 @@ class Chunks:
         Which data were left out; complete at the end.
     single, degrees : bool
         As of `PointTable`; known at the end.
+    las : LasForm or None
+        As of `PointTable`; known with the first piece.
     """
 
     def __init__(
@@ -68,6 +71,7 @@ class Chunks:
     ) -> None:
         self.notices: list[str] = []
         self.single = self.degrees = False
+        self.las: LasForm | None = None
         self._path, self._size, self._box, self._level = path, size, box, level
         self._las, self._columns = las, columns
         self._pieces = self._guarded()
@@ -111,6 +115,7 @@ class Chunks:
     def _read_las(self) -> Iterator[tuple[Floats, dict[str, Array]]]:
         with opened_las(self._path) as file:
             self.notices += file.left_out()
+            self.las = file.form(self._las)
             tally, near = Tally(self._las), True
             for points, attributes in las_pieces(file, tally, self._size, self._box, self._level):
                 near = near and file.is_geographic(points)
@@ -232,7 +237,11 @@ def extent(path: Path | str, las: LasChoices = LasChoices()) -> Extent:
 
 
 def join_pieces(
-    pieces: Sequence[tuple[Floats, dict[str, Array]]], path: Path, single: bool = False, degrees: bool = False
+    pieces: Sequence[tuple[Floats, dict[str, Array]]],
+    path: Path,
+    single: bool = False,
+    degrees: bool = False,
+    las: LasForm | None = None,
 ) -> PointTable:
     """Make one table of pieces, as of a whole file, of one file or of several.
 
@@ -243,6 +252,8 @@ def join_pieces(
     path : pathlib.Path
         For the texts of notices.
     single, degrees : bool
+        As of `PointTable`.
+    las : LasForm, optional
         As of `PointTable`.
 
     Returns
@@ -255,7 +266,7 @@ def join_pieces(
     TooFewPointsError
         There are no points.
     """
-    table = PointTable(np.concatenate([np.empty((0, 3)), *(points for points, _ in pieces)]), single=single)
+    table = PointTable(np.concatenate([np.empty((0, 3)), *(points for points, _ in pieces)]), single=single, las=las)
     check_places(table.points, path)
     table.degrees = degrees
     for name in dict.fromkeys(name for _, attributes in pieces for name in attributes):

@@ -14,6 +14,7 @@ _FOOT, _SURVEY_FOOT = 0.3048, 1200.0 / 3937.0  # in meters
 _SAME = 1e-7  # difference of lengths in writing one unit, relative; the two feet differ by 2e-6
 _DISTORTED = 1e-5  # difference of units of which nobody would notice that they are not the same
 
+_CONVERTED = "; they are converted to meters. Its coordinate system does not hold for these, and is not kept."
 _GEOGRAPHIC = {"GEOGCS", "GEOGCRS", "GEOGRAPHICCRS", "GEODCRS", "GEODETICCRS"}
 _PLANE = {"PROJCS", "PROJCRS", "PROJECTEDCRS", "LOCAL_CS", "ENGCRS", "ENGINEERINGCRS", "GEOCCS"}
 _HEIGHTS = {"VERT_CS", "VERTCS", "VERTCRS", "VERTICALCRS"}
@@ -104,13 +105,13 @@ class Reference(NamedTuple):
                 yield f"{path.name}: the unit of its coordinates is not told, so they are not converted to meters."
         elif not plane.is_like(heights.meters, _DISTORTED):
             yield f"{path.name}: x and y are in {plane}, heights in {heights}" + (
-                "; they are converted to meters."
+                _CONVERTED
                 if converted
                 else ", so the surface is distorted, and areas and curvatures are wrong. Convert to Meters mends it."
             )
         elif not plane.is_like(1.0):
             yield f"{path.name}: coordinates are in {plane}" + (
-                "; they are converted to meters."
+                _CONVERTED
                 if converted
                 else ", and so are lengths and areas, though Blender shows meters. Convert to Meters, or set Unit Scale"
                 f" in the properties of the scene to {plane.meters:.9g}."

@@ -1,7 +1,7 @@
 """The contents of a point file: coordinates, and other values, of each point."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import chain, count
 from pathlib import Path
@@ -10,11 +10,13 @@ import numpy as np
 
 from ..errors import InvalidPointsError, TooFewPointsError
 from ..types import Array, Bools, Floats
+from .las_form import LasForm
 from .lines import brief
 
 NORMAL = "normal"  # the attribute that files call nx ny nz
 SCANNER = "scanner"  # the attribute of positions of the scanner that measured a point, which move with the points
-_NORMALS = ("nx", "ny", "nz")
+NORMALS = ("nx", "ny", "nz")
+_NORMALS = (NORMALS, ("normalx", "normaly", "normalz"))  # in lower case
 _COLORS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
 CHANNELS = ("red", "green", "blue", "alpha")
 _ALPHAS = (("alpha",), ("diffuse_alpha",), ("a",))
@@ -40,6 +42,8 @@ class PointTable:
         Whether x and y are known to be longitude and latitude.
     notices : list of str
         Which data were left out.
+    las : LasForm or None
+        Of a LAS file: what it states besides, so that such files are written as it was.
     """
 
     points: Floats
@@ -48,6 +52,7 @@ class PointTable:
     single: bool = False
     degrees: bool = False
     notices: list[str] = field(default_factory=list)
+    las: LasForm | None = None
 
 
 def from_columns(columns: dict[str, Array], path: Path) -> PointTable:
@@ -56,8 +61,8 @@ def from_columns(columns: dict[str, Array], path: Path) -> PointTable:
     Parameters
     ----------
     columns : dict of str to ndarray, (n,)
-        x, y and z among them; nx ny nz become the attribute "normal", three columns a_x a_y a_z the vector a, and red
-        green blue, r g b, with alpha, the colors.
+        x, y and z among them; nx ny nz, or NormalX NormalY NormalZ, become the attribute "normal", three columns
+        a_x a_y a_z the vector a, and red green blue, r g b, with alpha, the colors.
     path : pathlib.Path
         The file, for the texts of errors.
     """
@@ -91,9 +96,7 @@ def gather_columns(columns: dict[str, Array], path: Path) -> tuple[PointTable, d
     channels = next(filter(None, map(take, _COLORS)), [])
     if channels:
         channels = [*channels, *next(filter(None, map(take, _ALPHAS)), [])]
-    normals = take(_NORMALS)
-    if normals is not None:
-        table.attributes[NORMAL] = np.stack(normals, axis=1)
+    table.attributes |= take_normals(left)
     for name in columns:
         match = re.fullmatch(r"(.+)_x", name)
         vector = [f"{match[1]}_{axis}" for axis in AXES] if match else []
@@ -102,6 +105,18 @@ def gather_columns(columns: dict[str, Array], path: Path) -> tuple[PointTable, d
         elif name in left:
             table.attributes[name] = left.pop(name)
     return table, dict(zip(CHANNELS, channels, strict=False))
+
+
+def normal_names(names: Iterable[str]) -> list[str]:
+    """Return which of some names are the three of normals, in their order; none if one is missing."""
+    named = {name.lower(): name for name in reversed([*names])}  # the first of those that differ in case only
+    return next(([named[name] for name in known] for known in _NORMALS if named.keys() >= set(known)), [])
+
+
+def take_normals(columns: dict[str, Array]) -> dict[str, Array]:
+    """Take the normals out of columns by the names that files give them, and return them as the attribute."""
+    normals = [columns.pop(name) for name in normal_names(columns)]
+    return {NORMAL: np.stack(normals, axis=1)} if normals else {}
 
 
 def color_by(table: PointTable, channels: dict[str, Array], path: Path) -> None:
@@ -157,7 +172,7 @@ def depth_notices(colors: Array, path: Path) -> Iterator[str]:
         yield f"{path.name}: no color is above {full:g}, so the range is taken as 0 to {full:g}."
 
 
-def to_columns(table: PointTable, double: bool = True) -> dict[str, Array]:
+def to_columns(table: PointTable, double: bool = True, full: float = 255.0) -> dict[str, Array]:
     """Return the columns of a table by the names of files, numbers as they are; the reverse of `from_columns`.
 
     Parameters
@@ -165,13 +180,15 @@ def to_columns(table: PointTable, double: bool = True) -> dict[str, Array]:
     table : PointTable
     double : bool
         Whether coordinates stay in double precision.
+    full : float
+        The number of a full color.
     """
     columns = dict(zip(AXES, (table.points if double else table.points.astype(np.float32)).T, strict=True))
     attributes = dict(table.attributes)
     if NORMAL in attributes and attributes[NORMAL].ndim == 2:
-        columns.update(zip(_NORMALS, attributes.pop(NORMAL).T, strict=True))
+        columns.update(zip(NORMALS, attributes.pop(NORMAL).T, strict=True))
     if table.colors is not None:
-        values = np.round(255.0 * table.colors).astype(np.uint8)
+        values = np.round(full * table.colors).astype(np.min_scalar_type(int(full)))
         columns.update(zip(CHANNELS, values.T, strict=True))
     for name, values in attributes.items():
         columns.update((_free_name(new, columns), numbers) for new, numbers in split_columns(name, values).items())

@@ -66,7 +66,7 @@ class TestRun:
             half = table.points[:, 0] >= 0.5 * LENGTH
             np.testing.assert_array_equal(table.attributes["classification"], 2 + half)
             np.testing.assert_allclose(table.colors[:, 0], np.where(half, 1.0, 0.2), atol=1e-2)
-            normal = np.column_stack([table.attributes[f"n{axis}"] for axis in "xyz"])
+            normal = table.attributes["normal"]
             assert np.all(np.einsum("ij,ij->i", normal[:, 1:], table.points[:, 1:]) > 0.0)
             assert set(table.attributes) >= {"lb_mean_curvature", "lb_boundary", "lb_component", "lb_trust"}
 

@@ -1,0 +1,154 @@
+"""All columns of LAS and LAZ, and what their headers state, survive whatever the program does with the points."""
+
+import laspy
+import numpy as np
+import pytest
+
+from core.files import LasChoices, read_points, write_points
+from tests.core.las_files import WAVEFORMS, check_same, write_all
+
+NORMALS = ("NormalX", "NormalY", "NormalZ")  # which an analysis replaces
+
+
+def joined(paths):
+    """Return the points of several files as of one."""
+    files = [laspy.read(path) for path in paths]
+    header = files[0].header
+    las = laspy.LasData(header)
+    las.points = laspy.ScaleAwarePointRecord(
+        np.concatenate([file.points.array for file in files]), header.point_format, header.scales, header.offsets
+    )
+    return las
+
+
+@pytest.mark.parametrize("kind", range(11))
+class TestEveryPointFormat:
+    @pytest.mark.parametrize("names", ["a.las b.laz", "a.laz b.las"])
+    def test_convert(self, run, tmp_path, kind, names):
+        source, target = (tmp_path / name for name in names.split())
+        given = write_all(source, kind)
+        code, [line] = run("convert", source, "--out", target)
+        assert code == 0
+        check_same(laspy.read(target), given)
+        assert len(line["notices"]) == (kind in WAVEFORMS)
+        assert all("left out the waveforms" in notice for notice in line["notices"])
+
+    def test_analyze(self, run, tmp_path, kind):
+        given = write_all(tmp_path / "a.las", kind)
+        assert run("analyze", tmp_path / "a.las", "--out", tmp_path / "b.laz")[0] == 0
+        found = laspy.read(tmp_path / "b.laz")
+        check_same(found, given, NORMALS)
+        assert (found["lb_area"] > 0.0).all()
+        assert (found["NormalZ"] ** 2 > 0.5).all()
+
+    def test_tiles(self, run, tmp_path, kind):
+        given = write_all(tmp_path / "a.laz", kind)
+        out = tmp_path / "out"
+        arguments = ("--tile-points", 120, "--format", "laz", "--one-file", tmp_path / "one.las")
+        assert run("tiles", "run", tmp_path / "a.laz", "--out-dir", out, *arguments)[0] == 0
+        tiles = sorted(out.glob("*.laz"))
+        assert len(tiles) == 2
+        check_same(joined(tiles), given, NORMALS)
+        check_same(laspy.read(tmp_path / "one.las"), given, NORMALS)
+
+    def test_fewer_points(self, run, tmp_path, kind):
+        given = write_all(tmp_path / "a.las", kind, withheld=True)
+        code, _ = run(
+            "thin-out", tmp_path / "a.las", "--withheld", "--count", 50, "--by", "NUMBER", "--out", tmp_path / "b.las"
+        )
+        assert code == 0
+        found = laspy.read(tmp_path / "b.las")
+        rows = np.flatnonzero(np.isin(given.points.array[["X", "Y", "Z"]], found.points.array[["X", "Y", "Z"]]))
+        given.points = given.points[rows]
+        check_same(found, given)
+
+
+@pytest.mark.parametrize("full", [1, 255, 1023, 65535])
+def test_colors_keep_their_range(tmp_path, full):
+    given = write_all(tmp_path / "a.las", 7, full=full)
+    write_points(tmp_path / "b.laz", read_points(tmp_path / "a.las"))
+    check_same(laspy.read(tmp_path / "b.laz"), given)
+
+
+def test_columns_and_systems_that_other_files_know_nothing_of(run, tmp_path):
+    """What is zero everywhere is no column, and written as zeros again."""
+    las = laspy.LasData(laspy.LasHeader(point_format=1, version="1.2"))
+    las.x = las.y = las.z = np.arange(10.0)
+    las.user_data = np.arange(10)
+    las.write(str(tmp_path / "a.las"))
+    table = read_points(tmp_path / "a.las")
+    assert list(table.attributes) == ["intensity", "classification", "return_number", "user_data"]
+    write_points(tmp_path / "b.las", table)
+    found = laspy.read(tmp_path / "b.las")
+    assert found.points.array.tobytes() == las.points.array.tobytes()
+
+
+def test_a_column_of_another_format_is_not_lost(tmp_path):
+    write_all(tmp_path / "a.las", 0)
+    table = read_points(tmp_path / "a.las")
+    table.attributes["gps_time"] = np.linspace(0.0, 1.0, len(table.points))
+    table.colors = np.ones((len(table.points), 4), np.float32)
+    table.attributes["user_data"] = np.full(len(table.points), 256)
+    [notice] = write_points(tmp_path / "b.las", table)
+    assert "user_data is written as user_data_2" in notice
+    found = laspy.read(tmp_path / "b.las")
+    assert found.point_format.id == 3
+    np.testing.assert_array_equal(found.gps_time, table.attributes["gps_time"])
+    assert (found.red == 65535).all()
+    assert (found["user_data_2"] == 256).all()
+
+
+def test_numbers_that_extra_bytes_do_not_hold_get_another_type(tmp_path):
+    write_all(tmp_path / "a.las", 6)
+    table = read_points(tmp_path / "a.las")
+    count = len(table.points)
+    table.attributes |= {"Deviation": np.full(count, -1), "Amplitude": np.full(count, 1e4)}
+    assert write_points(tmp_path / "b.las", table) == []
+    found = laspy.read(tmp_path / "b.las")
+    assert (found["Deviation"] == -1).all()
+    assert (found["Amplitude"] == 1e4).all()
+
+
+class TestSystem:
+    def test_does_not_hold_for_other_units(self, tmp_path):
+        feet = 'PROJCS["a",GEOGCS["b"],UNIT["foot",0.3048]]'
+        given = write_all(tmp_path / "a.las", 6, wkt=feet)
+        table = read_points(tmp_path / "a.las", las=LasChoices(meters=True))
+        assert any("Its coordinate system does not hold for these, and is not kept" in text for text in table.notices)
+        write_points(tmp_path / "b.las", table)
+        found = laspy.read(tmp_path / "b.las")
+        assert not found.header.vlrs.get("WktCoordinateSystemVlr")
+        assert not found.header.global_encoding.wkt
+        np.testing.assert_array_equal(found.X, given.X)
+        np.testing.assert_allclose(found.xyz, 0.3048 * given.xyz, rtol=1e-12)
+
+    def test_of_files_that_differ_is_told_and_not_written(self, run, tmp_path):
+        write_all(tmp_path / "a.las", 6, scale=0.001)
+        write_all(tmp_path / "b.las", 7, scale=0.0001, wkt='PROJCS["other",GEOGCS["b"],UNIT["metre",1]]', time=0)
+        out = tmp_path / "out"
+        sources = (tmp_path / "a.las", tmp_path / "b.las")
+        code, [line] = run("tiles", "run", *sources, "--out-dir", out, "--tile-points", 500, "--format", "laz")
+        assert code == 0
+        told = " ".join(line["notices"])
+        assert "The files state different coordinate systems" in told
+        assert "The GPS times of some files count from the begin of a week" in told
+        found = laspy.read(out / "tile_000000.laz")
+        assert not found.header.vlrs.get("WktCoordinateSystemVlr")
+        assert (found.point_format.id, found.header.scales[0]) == (7, 0.0001)
+        assert (np.array(found.number_of_returns) >= np.array(found.return_number)).all()
+
+
+def test_normals_of_other_programs(tmp_path):
+    for names in (("NormalX", "NormalY", "NormalZ"), ("nx", "ny", "nz"), ("normalx", "normaly", "normalz")):
+        header = laspy.LasHeader(point_format=6, version="1.4")
+        header.add_extra_dims([laspy.ExtraBytesParams(name, "f4") for name in names])
+        las = laspy.LasData(header)
+        las.x = las.y = las.z = np.arange(3.0)
+        for name, values in zip(names, np.eye(3), strict=True):
+            las[name] = values
+        las.write(str(tmp_path / "a.las"))
+        table = read_points(tmp_path / "a.las")
+        np.testing.assert_array_equal(table.attributes["normal"], np.eye(3))
+        assert not {*names} & {*table.attributes}
+        write_points(tmp_path / "b.las", table)
+        assert tuple(laspy.read(tmp_path / "b.las").point_format.extra_dimension_names) == names
