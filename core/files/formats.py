@@ -16,7 +16,8 @@ from .arrays import read_array
 from .e57 import read_e57
 from .las import read_las
 from .las_choices import LasChoices
-from .las_writing import FULL, write_las
+from .las_form import FULL
+from .las_writing import write_las
 from .lines import brief
 from .origin import look_like_degrees
 from .pcd import read_pcd

@@ -12,8 +12,8 @@ from ..errors import PointCloudError, TooFewPointsError
 from ..types import Array, Bools, Floats
 from .copc import Box, Octree, read_octree, records_of
 from .las_choices import LasChoices
-from .las_form import LasForm, read_form
-from .las_packing import PackedChunk, check_header, check_size
+from .las_form import SYSTEM, LasForm, read_form
+from .las_packing import PackedChunk, check_header, check_size, records_after
 from .reference import Reference, read_reference
 from .rows import too_short
 from .table import CHANNELS, NORMAL, NORMALS, PointTable, color_by, full_color, normal_names, take_normals
@@ -150,6 +150,8 @@ def opened_las(path: Path) -> Iterator[LasFile]:
             # Not in parallel: that takes memory for as many points as a file names in a chunk.
             with laspy.open(file, closefd=False, read_evlrs=False, laz_backend=laspy.LazBackend.Lazrs) as reader:
                 chunks = check_size(file, reader.header, path)
+                for record in records_after(file, reader.header, SYSTEM):
+                    reader.header.vlrs.append(laspy.vlrs.known.vlr_factory(laspy.VLR(*record)))
                 yield LasFile(path, file, reader, chunks, read_reference(reader.header))
         except (laspy.errors.LaspyException, lazrs.LazrsError) as error:
             raise ValueError(f"{error}") from error  # `read_points` reports it as numpy's

@@ -11,10 +11,11 @@ import numpy as np
 
 from ..types import Bools, Floats
 
-_SYSTEM = "LASF_Projection"  # who states the coordinate system
+SYSTEM = "LASF_Projection"  # who states the coordinate system
 _TIME, _WKT = 0b1, 0b10000  # bits of the encoding: times count from 1980 less a billion seconds; the system is in WKT
 _KEPT = _TIME | 0b1000 | _WKT  # and that returns were made up; not those of waveforms
 _WITHOUT_WAVEFORMS = {4: 1, 5: 3, 9: 6, 10: 8}  # point formats
+FULL = 65535.0  # of a color
 _NEAR = 0.25  # of a step, within which no other one may be meant
 _ROUNDING = 8.0 * float(np.finfo(np.float64).eps)  # relative, of few operations
 
@@ -47,7 +48,7 @@ class LasForm:
     encoding: int = 0
     records: list[tuple[int, str, str]] = field(default_factory=list)
     extras: dict[str, dict[str, Any]] = field(default_factory=dict)
-    full: float = 65535.0
+    full: float = FULL
 
     def scaled(self, factors: Floats) -> LasForm:
         """Return it for coordinates times some factors, (3,), of which its coordinate system tells nothing."""
@@ -78,7 +79,7 @@ class LasForm:
 
     def system(self) -> Iterable[tuple[str, int, str, bytes]]:
         """Yield the records of the coordinate system as `laspy.VLR` takes them."""
-        return ((_SYSTEM, number, text, base64.b64decode(data)) for number, text, data in self.records)
+        return ((SYSTEM, number, text, base64.b64decode(data)) for number, text, data in self.records)
 
     def to_json(self) -> dict[str, Any]:
         """Return it as numbers, texts, lists and dicts, of which `LasForm` makes it again."""
@@ -97,7 +98,7 @@ def read_form(header: Any, extras: dict[str, Any]) -> LasForm:
         [
             (record.record_id, str(record.description), base64.b64encode(record.record_data_bytes()).decode())
             for record in header.vlrs
-            if record.user_id == _SYSTEM
+            if record.user_id == SYSTEM
         ],
         {column: _parameters(item) for column, item in extras.items()},
     )
@@ -113,7 +114,7 @@ def _parameters(item: Any) -> dict[str, Any]:
     }
 
 
-def join_forms(forms: Iterable[LasForm | None], full: float) -> tuple[LasForm | None, list[str]]:
+def join_forms(forms: Iterable[LasForm | None], full: float = FULL) -> tuple[LasForm | None, list[str]]:
     """Return one form for points of several files, and notices of what these differ in.
 
     Steps are the finest; extra bytes those that are the same in all.

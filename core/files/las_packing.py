@@ -2,6 +2,7 @@
 
 import os
 import struct
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
@@ -10,6 +11,8 @@ from .rows import unpacks_too_far
 
 _SHORTEST = 227  # bytes of a header
 _DETAIL = 54  # bytes of a variable length record at least
+_AFTER = struct.Struct("<2x16sHQ32s")  # of a record after the points: whose, its number, bytes, what it is
+_MOST = 65535  # bytes of a record before them
 _CHUNKED, _LAYERED = 2, 3  # kinds of compression
 # Items of a compressed point by number: bytes, and layers if there are any. Others are extra bytes, a layer for each.
 _ITEMS = {6: (20, 0), 7: (8, 0), 8: (6, 0), 9: (29, 0), 10: (30, 9), 11: (6, 1), 12: (8, 2), 13: (29, 1)}
@@ -38,6 +41,23 @@ def check_header(file: BinaryIO, path: Path) -> None:
             " again."
         )
     file.seek(0)
+
+
+def records_after(file: BinaryIO, header: Any, user: str) -> Iterator[tuple[str, int, str, bytes]]:
+    """Yield the records of a user that lie after the points, as `laspy.VLR` takes them.
+
+    Those that are longer than records before the points may be, or than the file, are left out: laspy would read all.
+    """
+    back, size, place = file.tell(), os.fstat(file.fileno()).st_size, header.start_of_first_evlr
+    for _ in range(header.number_of_evlrs):
+        if not 0 < place <= size - _AFTER.size:
+            break
+        file.seek(place)
+        name, number, length, text = _AFTER.unpack(file.read(_AFTER.size))
+        if name.rstrip(b"\0") == user.encode() and length <= min(_MOST, size - place - _AFTER.size):
+            yield user, number, text.rstrip(b"\0").decode("ascii", "replace"), file.read(length)
+        place += _AFTER.size + length
+    file.seek(back)
 
 
 def check_size(file: BinaryIO, header: Any, path: Path) -> list[PackedChunk]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import PointCloudError
 from ..types import Array, Bools, Floats
-from .las_form import LasForm
+from .las_form import FULL, LasForm
 from .ranges import ColumnPieces, Columns, Range, ranges_of
 from .table import AXES, CHANNELS, NORMALS
 
@@ -18,7 +18,6 @@ _COLORS, _ALPHA = CHANNELS[:3], CHANNELS[3]
 _RETURNS = ("return_number", "number_of_returns")
 _LEGACY, _EXTENDED = (0, 1, 2, 3), (6, 7, 8)  # point formats, those of few bits and those of many
 _NORMALS = dict(zip(NORMALS, ("NormalX", "NormalY", "NormalZ"), strict=True))  # as other programs find them
-FULL = 65535.0  # of a color
 _STEPS = 2.0**31  # that a coordinate has
 _NAME = 32  # bytes of a name
 _FINEST = -9  # power of ten of the finest step: coarser ones compress better

@@ -13,7 +13,7 @@ from ...command.clouds import save_arrays
 from ...command.rows import write_rows, write_text
 from ...command.svg import profile_picture
 from ...core import PointCloudError
-from ...core.files import replacing, write_points
+from ...core.files import WRITABLE, replacing, write_points
 from ..objects.options import laplacian_options
 from ..objects.parts import kept_rows
 from ..objects.place import place_of
@@ -68,18 +68,20 @@ class ExportOperator(JobOperator, ExportHelper):
 
 
 class MESHFREE_OT_export_points(ExportOperator, bpy.types.Operator):
-    """Export the points of the active object as they are seen, with their results, to a PLY, XYZ or CSV file"""
+    """Export the points of the active object as they are seen, with results, to a PLY, LAS, LAZ, XYZ or CSV file"""
 
     bl_idname = "meshfree.export_points"
     bl_label = "Export Points"
     asks = ("format", "attributes", "colors")
 
-    filter_glob: file_filter(".ply", ".xyz", ".csv")
+    filter_glob: file_filter(*WRITABLE)
     format: EnumProperty(
         name="Format",
         description="Kind of the file in the file browser; in scripts the ending of the name decides",
         items=[
             ("PLY", "PLY", "Binary, with the types of all values"),
+            ("LAS", "LAS", "As scanners write it, with the coordinate system of a LAS or LAZ file that was imported"),
+            ("LAZ", "LAZ", "The same, compressed"),
             ("XYZ", "XYZ", "Text with a point a line, and the names of the columns in a comment"),
             ("CSV", "CSV", "Text for spreadsheets, with the names of the columns in the first line"),
         ],

@@ -206,7 +206,7 @@ def _find_discs(points, progress):
 def _rotate_up(table, up):
     """Return a table rotated so that its Y axis, or -Y, points upwards."""
     vectors = {name: _rotate(values, up) for name, values in table.attributes.items() if values.ndim == 2}
-    return replace(table, points=_rotate(table.points, up), attributes={**table.attributes, **vectors})
+    return replace(table, points=_rotate(table.points, up), attributes={**table.attributes, **vectors}, las=None)
 
 
 def _rotate(vectors, up):

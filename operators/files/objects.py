@@ -1,5 +1,7 @@
 """Conversion between objects and point files, for the menus and the command line."""
 
+import json
+
 import bpy
 import numpy as np
 from bpy.props import StringProperty
@@ -11,6 +13,7 @@ from ...core.files import (
     READABLE,
     SPLATS,
     WRITABLE,
+    LasForm,
     PointTable,
     choose_origin,
     is_coarse,
@@ -21,7 +24,7 @@ from ...core.files.table import SCANNER
 from ..objects.attributes import ONLY_DRAWN, STORABLE, own_positions, read_attribute, type_of, write_attribute
 from ..objects.colors import own_colors
 from ..objects.groups import add_group, has_group
-from ..objects.place import OFFSET, place_of
+from ..objects.place import LAS, OFFSET, place_of
 from ..objects.reading import seen_positions
 from .columns import RENAMED, Column, doubted_columns, known_digits, read_columns, remember_columns
 
@@ -77,6 +80,8 @@ def add_object(name, table, collection, known=None, with_attributes=True):
     obj = bpy.data.objects.new(name, mesh)
     if origin.any():
         obj[OFFSET] = origin.tolist()
+    if table.las is not None:
+        obj[LAS] = json.dumps(table.las.to_json())
     remember_columns(obj, columns)
     collection.objects.link(obj)
     return obj
@@ -137,12 +142,17 @@ def point_table(context, obj, attributes="ALL", with_colors=True) -> PointTable:
     Returns
     -------
     PointTable
-        With normals and scanner positions in world space. `single` says whether single precision resolves the
+        With normals and scanner positions in world space. Of LAS files, coordinates that Blender has rounded only are
+        those of the file again. `single` says whether single precision resolves the
         coordinates; notices name the columns in doubt.
     """
     matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
+    seen = seen_positions(context, obj)
     with np.errstate(invalid="ignore"):  # infinite points become NaN when transformed
-        table = PointTable(seen_positions(context, obj).astype(np.float64) @ matrix.T + place_of(obj))
+        table = PointTable(seen.astype(np.float64) @ matrix.T + place_of(obj))
+        if LAS in obj:
+            table.las = LasForm(**json.loads(obj[LAS]))
+            table.points = table.las.restored(table.points, np.spacing(np.abs(seen).max(initial=0.0)))
     table.single = not (OFFSET in obj or is_coarse(table.points))
     data = obj.data
     names = [layer.name for layer in data.attributes if _is_column(layer)] if attributes != "NONE" else []

@@ -12,7 +12,7 @@ from ... import core
 from ...command.quantities import MEAN_CURVATURE, PREFIX
 from ...core import PointCloudError
 from ...core.errors import NotEnoughMemoryError
-from ...core.files import READABLE, SCANS, LasChoices, PointTable, chunks, extent, join_notices, join_pieces
+from ...core.files import READABLE, SCANS, LasChoices, PointTable, chunks, extent, join_forms, join_notices, join_pieces
 from ...core.memory import available_memory
 from ..objects.attributes import deselect
 from ..objects.box import Box, box_of
@@ -48,6 +48,7 @@ class _Reading:
     single: bool = False
     degrees: bool = False
     notices: list = field(default_factory=list)
+    forms: list = field(default_factory=list)
 
 
 class MESHFREE_OT_import_tiles(ImportOperator, bpy.types.Operator):
@@ -191,8 +192,9 @@ def _read_anew(paths, wanted, name, progress) -> tuple[PointTable, int]:
         kept = core.thin_pieces(pieces, wanted.count)
     if not kept and wanted.box is not None:
         raise PointCloudError(f"None of the {seen.total:,} points is inside the box. Move or scale its object.")
-    table = join_pieces(kept, Path(name), seen.single, seen.degrees)
-    table.notices = [*join_notices(seen.notices), *table.notices]
+    las, differing = join_forms(seen.forms)
+    table = join_pieces(kept, Path(name), seen.single, seen.degrees, las)
+    table.notices = [*join_notices(seen.notices), *differing, *table.notices]
     return table, seen.total
 
 
@@ -216,6 +218,7 @@ def _pieces(paths, wanted, seen, progress):
         seen.total += count if is_scan else done
         seen.single, seen.degrees = seen.single or found.single, seen.degrees or found.degrees
         seen.notices += found.notices
+        seen.forms.append(found.las)
 
 
 def _within_memory(pieces):

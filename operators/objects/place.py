@@ -11,11 +11,14 @@ from .attributes import point_count
 OFFSET = "lb_offset"  # custom property of an object: coordinates in its file less those after import
 COLUMNS = "lb_columns"  # custom property: how columns of its file are stored, in JSON; see operators/files
 
+LAS = "lb_las"  # custom property: what its LAS file states besides, in JSON; see core/files/las_form.py
+
 
 def copy_place(obj, other):
-    """Copy offset and columns of the file from another object, whose attributes an object has at all points."""
-    if OFFSET in other:
-        obj[OFFSET] = other[OFFSET]
+    """Copy offset, columns and header of the file from another object, whose attributes an object has at all points."""
+    for name in (OFFSET, LAS):
+        if name in other:
+            obj[name] = other[name]
     if COLUMNS in other:
         obj[COLUMNS] = json.dumps({**json.loads(other[COLUMNS]), "points": point_count(obj.data)})
 

@@ -174,6 +174,19 @@ def test_classes_and_withheld_points_of_scans(run, tmp_path):
     assert "no class of LAS" in line["error"]
 
 
+@pytest.mark.parametrize("kind", [1, 7])
+def test_scans_are_written_as_they_were_read(run, tmp_path, kind):
+    import laspy
+
+    from tests.core.las_files import check_same, write_all
+
+    given = write_all(tmp_path / "in.las", kind, full=255)
+    assert run("analyze", tmp_path / "in.las", "--out", tmp_path / "out.laz")[0] == 0
+    found = laspy.read(tmp_path / "out.laz")
+    check_same(found, given, ("NormalX", "NormalY", "NormalZ"))
+    assert (found["lb_area"] > 0.0).all()
+
+
 def test_stiffness_of_the_arrays(core, run, tmp_path):
     from scipy.sparse import load_npz  # bundled with the extension
 

@@ -603,6 +603,21 @@ def test_what_laser_scanners_measure_becomes_attributes(tmp_path, name):
     assert obj.data.color_attributes["Color"].data[0].color_srgb[:] == pytest.approx((1.0, 0.0, 0.0, 1.0), abs=0.01)
 
 
+@pytest.mark.parametrize("kind", [0, 3, 6, 8, 10])
+def test_laser_scans_are_exported_as_they_were_imported(extension, tmp_path, kind):
+    import laspy  # that of the extension
+
+    from tests.core.las_files import check_same, write_all
+
+    given = write_all(tmp_path / "a.las", kind, full=255)
+    run_import(tmp_path / "a.las")
+    assert bpy.ops.meshfree.export_points(filepath=str(tmp_path / "b.laz")) == {"FINISHED"}
+    check_same(laspy.read(tmp_path / "b.laz"), given)
+    bpy.ops.meshfree.import_tiles(filepath=str(tmp_path / "a.las"))
+    assert bpy.ops.meshfree.export_points(filepath=str(tmp_path / "c.las")) == {"FINISHED"}
+    check_same(laspy.read(tmp_path / "c.las"), given)
+
+
 class TestPlacesOfScanners:
     PLACES = (
         (446_100.0, 4_000_500.0, 80.0),

@@ -203,7 +203,7 @@ def test_a_broken_tile_stops_all(survey):
 
 
 def test_too_many_points_for_the_memory_are_refused(survey, monkeypatch):
-    monkeypatch.setattr(part("operators.files.tiles"), "available_memory", lambda: 100_000)
+    monkeypatch.setattr(part("operators.files.tiles"), "available_memory", lambda: 130_000)
     with pytest.raises(RuntimeError, match="More than 1,800 points need more memory than is free. Import a number"):
         run_import(survey, density="ALL")
     assert run_import(survey, count=100)

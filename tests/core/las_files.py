@@ -54,7 +54,7 @@ def write_all(path, kind, side=14, full=65535, withheld=False, wkt=WKT, scale=0.
         las.gps_time = 3e8 + rng.random(side**2)
     las.Deviation = rng.integers(0, 200, side**2)
     las.Amplitude = 10.0 + rng.integers(-3000, 3000, side**2) / 100.0
-    las.beam = rng.normal(size=(side**2, 3))
+    las.beam = rng.normal(size=(side**2, 3)).astype(np.float32)  # as many digits as Blender keeps
     las["odd\nname"] = rng.integers(-5, 5, side**2)
     las.NormalZ = np.ones(side**2)
     las.write(str(path))

@@ -122,6 +122,17 @@ class TestSystem:
         np.testing.assert_array_equal(found.X, given.X)
         np.testing.assert_allclose(found.xyz, 0.3048 * given.xyz, rtol=1e-12)
 
+    def test_may_follow_the_points(self, tmp_path):
+        given = write_all(tmp_path / "a.las", 6)
+        record = given.header.vlrs.extract("WktCoordinateSystemVlr")[0]
+        given.evlrs = laspy.vlrs.vlrlist.VLRList([laspy.VLR("someone", 1, "", bytes(70_000)), record])
+        for name in ("b.las", "b.laz"):
+            given.write(str(tmp_path / name))
+            table = read_points(tmp_path / name)
+            write_points(tmp_path / "c.laz", table)
+            [found] = laspy.read(tmp_path / "c.laz").header.vlrs.get("WktCoordinateSystemVlr")
+            assert found.record_data_bytes() == record.record_data_bytes()
+
     def test_of_files_that_differ_is_told_and_not_written(self, run, tmp_path):
         write_all(tmp_path / "a.las", 6, scale=0.001)
         write_all(tmp_path / "b.las", 7, scale=0.0001, wkt='PROJCS["other",GEOGCS["b"],UNIT["metre",1]]', time=0)
