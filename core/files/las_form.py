@@ -12,8 +12,8 @@ import numpy as np
 from ..types import Bools, Floats
 
 SYSTEM = "LASF_Projection"  # who states the coordinate system
-_TIME, _WKT = 0b1, 0b10000  # bits of the encoding: times count from 1980 less a billion seconds; the system is in WKT
-_KEPT = _TIME | 0b1000 | _WKT  # and that returns were made up; not those of waveforms
+TIME, WKT = 0b1, 0b10000  # bits of the encoding: times do not begin anew each week; the system is in WKT
+_KEPT = TIME | 0b1000 | WKT  # and that returns were made up; not those of waveforms
 _WITHOUT_WAVEFORMS = {4: 1, 5: 3, 9: 6, 10: 8}  # point formats
 FULL = 65535.0  # of a color
 _NEAR = 0.25  # of a step, within which no other one may be meant
@@ -55,7 +55,7 @@ class LasForm:
         if (factors == 1.0).all():
             return self
         scales, offsets = (np.multiply(numbers, factors).tolist() for numbers in (self.scales, self.offsets))
-        return replace(self, scales=scales, offsets=offsets, records=[], encoding=self.encoding & ~_WKT)
+        return replace(self, scales=scales, offsets=offsets, records=[])
 
     def holds(self, points: Floats) -> Bools:
         """Return on which axes coordinates, (n, 3), are on the steps, and not too many of these, (3,)."""
@@ -89,6 +89,8 @@ class LasForm:
 def read_form(header: Any, extras: dict[str, Any]) -> LasForm:
     """Return what the header of laspy states, with the extra bytes of some columns by their names."""
     number = header.point_format.id
+    described = [item for record in header.vlrs.get("ExtraBytesVlr") for item in record.extra_bytes_structs]
+    missing = {item.format_name(): item.no_data for item in described}  # which laspy tells nowhere else
     return LasForm(
         _WITHOUT_WAVEFORMS.get(number, number),
         str(header.version),
@@ -100,12 +102,12 @@ def read_form(header: Any, extras: dict[str, Any]) -> LasForm:
             for record in header.vlrs
             if record.user_id == SYSTEM
         ],
-        {column: _parameters(item) for column, item in extras.items()},
+        {column: _parameters(item, missing.get(item.name)) for column, item in extras.items()},
     )
 
 
-def _parameters(item: Any) -> dict[str, Any]:
-    numbers = {name: getattr(item, name) for name in ("offsets", "scales", "no_data")}
+def _parameters(item: Any, missing: Any) -> dict[str, Any]:
+    numbers = {"offsets": item.offsets, "scales": item.scales, "no_data": missing}
     return {
         "name": item.name,
         "type": item.type_str(),
@@ -129,12 +131,17 @@ def join_forms(forms: Iterable[LasForm | None], full: float = FULL) -> tuple[Las
     found = [form for form in forms if form is not None]
     if not found:
         return None, []
-    first, notices = found[0], list[str]()
-    encoding, records = first.encoding, first.records
-    if any([record[::2] for record in form.records] != [record[::2] for record in records] for form in found):
+    stated = [form for form in found if form.records]
+    first, notices = (stated or found)[0], list[str]()
+    records = first.records
+    if any([record[::2] for record in form.records] != [record[::2] for record in records] for form in stated):
         notices.append("The files state different coordinate systems. None is kept: transform them to one first.")
-        encoding, records = encoding & ~_WKT, []
-    if len({form.encoding & _TIME for form in found}) > 1:
+        records = []
+    elif stated and len(stated) < len(found):
+        notices.append(
+            f"{len(found) - len(stated)} of the files state no coordinate system. That of the others is kept."
+        )
+    if len({form.encoding & TIME for form in found}) > 1:
         notices.append(
             "The GPS times of some files count from the begin of a week, those of others do not. They are kept as they"
             " are: do not compare them."
@@ -144,7 +151,6 @@ def join_forms(forms: Iterable[LasForm | None], full: float = FULL) -> tuple[Las
         kind=max(form.kind for form in found),
         version=max(form.version for form in found),
         scales=np.min([form.scales for form in found], axis=0).tolist(),
-        encoding=encoding,
         records=records,
         full=full,
         extras={

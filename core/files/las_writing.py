@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import PointCloudError
 from ..types import Array, Bools, Floats
-from .las_form import FULL, LasForm
+from .las_form import FULL, TIME, WKT, LasForm
 from .ranges import ColumnPieces, Columns, Range, ranges_of
 from .table import AXES, CHANNELS, NORMALS
 
@@ -18,6 +18,7 @@ _COLORS, _ALPHA = CHANNELS[:3], CHANNELS[3]
 _RETURNS = ("return_number", "number_of_returns")
 _LEGACY, _EXTENDED = (0, 1, 2, 3), (6, 7, 8)  # point formats, those of few bits and those of many
 _NORMALS = dict(zip(NORMALS, ("NormalX", "NormalY", "NormalZ"), strict=True))  # as other programs find them
+_TIMES, _WEEK = "gps_time", 604_800.0  # seconds
 _STEPS = 2.0**31  # that a coordinate has
 _NAME = 32  # bytes of a name
 _FINEST = -9  # power of ten of the finest step: coarser ones compress better
@@ -75,6 +76,7 @@ def write_las(path: Path, pieces: ColumnPieces, name: str, form: LasForm | None 
     header = laspy.LasHeader(point_format=kind, version=version)
     header.offsets, header.scales = np.floor(low), np.full(3, _step(low, high))
     places, extras, notices = _places(header.point_format, ranges, form, name)
+    header.global_encoding.value = _encoding(kind, ranges) if form is None else form.encoding
     if form is not None:
         steps = np.where(on_steps, form.scales, header.scales)
         if (steps > form.scales).any():
@@ -83,12 +85,13 @@ def write_las(path: Path, pieces: ColumnPieces, name: str, form: LasForm | None 
                 " they are from: they reach too far."
             )
         header.offsets, header.scales = np.where(on_steps, form.offsets, header.offsets), steps
-        header.global_encoding.value = form.encoding
         header.vlrs.extend(laspy.VLR(*record) for record in form.system())
     header.add_extra_dims([laspy.ExtraBytesParams(**given) for given in extras])
     for record in header.vlrs.get("ExtraBytesVlr"):
         for item in record.extra_bytes_structs:  # laspy would state ranges, of the first point of each piece alone
             item.options &= ~(item.MIN_BIT_MASK | item.MAX_BIT_MASK)
+    if form is None and header.global_encoding.value & TIME:
+        notices.append(f"{name}: gps_time goes beyond a week, so it is written as standard GPS time.")
     unknown = [column for column in _RETURNS if form is None and column not in {place.name for place in places}]
     if unknown == [_RETURNS[1]]:
         notices.append(
@@ -128,6 +131,12 @@ def _point_format(layouts: dict[int, Any], ranges: Iterable[str], form: LasForm 
         family = _LEGACY if form.kind in _LEGACY else _EXTENDED
         choices, wanted = [form.kind, *family, *choices], wanted - form.extras.keys()
     return max(choices, key=lambda kind: len(wanted.intersection(layouts[kind].standard_dimension_names)))
+
+
+def _encoding(kind: int, ranges: dict[str, Range]) -> int:
+    """Return the bits of a header that are valid for points of which no file states any."""
+    times = ranges.get(_TIMES)
+    return WKT * (kind not in _LEGACY) | TIME * (times is not None and times.high > _WEEK)
 
 
 def _places(

@@ -19,10 +19,8 @@ def write_all(path, kind, side=14, full=65535, withheld=False, wkt=WKT, scale=0.
     header.scales, header.offsets = np.array([scale, scale, 0.5 * scale]), PLACE + 0.0005
     header.global_encoding.gps_time_type = laspy.header.GpsTimeType(time)
     header.global_encoding.wkt = kind > 5
-    user = "LASF_Projection"
-    header.vlrs.append(
-        laspy.VLR(user, 2112, "WKT", wkt.encode() + b"\0") if kind > 5 else laspy.VLR(user, 34735, "", KEYS)
-    )
+    number, data = (2112, wkt.encode() + b"\0") if kind > 5 else (34735, KEYS)
+    header.vlrs.extend([laspy.VLR("LASF_Projection", number, "a system", data)] if wkt else [])
     header.add_extra_dims(
         [
             laspy.ExtraBytesParams("Deviation", "u2", "shape of the echo"),
@@ -78,9 +76,14 @@ def check_same(found, given, extra=()):
     for item in given.point_format.extra_dimensions:
         if item.name not in extra:
             assert items[item.name] == item
-            assert items[item.name].no_data == item.no_data
             pair = [np.asarray(las[item.name])[rows] for las, rows in zip((found, given), order, strict=True)]
             np.testing.assert_allclose(*pair, rtol=1e-12, err_msg=item.name)
+    missing = [
+        {item.format_name(): item.no_data for item in las.header.vlrs.get("ExtraBytesVlr")[0].extra_bytes_structs}
+        for las in (found, given)
+    ]
+    assert missing[1]["Amplitude"] == [-1]
+    assert missing[0].items() >= missing[1].items()
     np.testing.assert_array_equal(found.header.scales, given.header.scales)
     np.testing.assert_array_equal(found.header.offsets, given.header.offsets)
     assert found.header.global_encoding.value == given.header.global_encoding.value

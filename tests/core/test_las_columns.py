@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from core.files import LasChoices, read_points, write_points
-from tests.core.las_files import WAVEFORMS, check_same, write_all
+from tests.core.las_files import WAVEFORMS, WKT, check_same, write_all
 
 NORMALS = ("NormalX", "NormalY", "NormalZ")  # which an analysis replaces
 
@@ -118,7 +118,6 @@ class TestSystem:
         write_points(tmp_path / "b.las", table)
         found = laspy.read(tmp_path / "b.las")
         assert not found.header.vlrs.get("WktCoordinateSystemVlr")
-        assert not found.header.global_encoding.wkt
         np.testing.assert_array_equal(found.X, given.X)
         np.testing.assert_allclose(found.xyz, 0.3048 * given.xyz, rtol=1e-12)
 
@@ -132,6 +131,16 @@ class TestSystem:
             write_points(tmp_path / "c.laz", table)
             [found] = laspy.read(tmp_path / "c.laz").header.vlrs.get("WktCoordinateSystemVlr")
             assert found.record_data_bytes() == record.record_data_bytes()
+
+    def test_of_some_files_is_that_of_all(self, run, tmp_path):
+        write_all(tmp_path / "a.las", 6, wkt="")
+        write_all(tmp_path / "b.las", 6)
+        out = tmp_path / "out"
+        sources = (tmp_path / "a.las", tmp_path / "b.las")
+        _, [line] = run("tiles", "run", *sources, "--out-dir", out, "--tile-points", 500, "--format", "laz")
+        assert "1 of the files state no coordinate system. That of the others is kept." in line["notices"]
+        [record] = laspy.read(out / "tile_000000.laz").header.vlrs.get("WktCoordinateSystemVlr")
+        assert record.string == WKT
 
     def test_of_files_that_differ_is_told_and_not_written(self, run, tmp_path):
         write_all(tmp_path / "a.las", 6, scale=0.001)

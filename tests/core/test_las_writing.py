@@ -93,6 +93,13 @@ class TestOfOtherKindsOfFiles:
         assert (np.array(las.return_number) == 1).all()
         assert (np.array(las.number_of_returns) == 1).all()
         assert las.header.number_of_points_by_return[0] == 50
+        assert las.header.global_encoding.wkt  # as of all point formats from 6 on
+
+    @pytest.mark.parametrize(("last", "kind"), [(604_800.0, 0), (3e8, 1)])
+    def test_times_beyond_a_week_do_not_count_from_its_begin(self, tmp_path, last, kind):
+        notices = write_points(tmp_path / "a.las", PointTable(POINTS, {"gps_time": np.linspace(0.0, last, 50)}))
+        assert laspy.read(tmp_path / "a.las").header.global_encoding.gps_time_type == kind
+        assert notices == kind * ["a.las: gps_time goes beyond a week, so it is written as standard GPS time."]
 
     def test_returns_of_an_unknown_number_are_told(self, tmp_path):
         table = PointTable(POINTS, {"return_number": np.arange(50) % 4})
