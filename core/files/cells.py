@@ -19,7 +19,6 @@ _SAMPLE = 100  # rows by which kinds of columns are decided
 _MISSING = r"(?:n/?a|nan|null|none|nil|no ?data|-|--|\?|\*)"
 _IS_MISSING = re.compile(f"{_MISSING}?", re.IGNORECASE)
 _COMMENTS = ("#", "//", "%", "!")
-_MARKED = re.compile(r"1\.?#(?:(INF)|QNAN|SNAN|IND|NAN)\d*|nan\(\w*\)", re.IGNORECASE)  # as Visual C writes them
 
 
 @dataclass
@@ -111,18 +110,12 @@ def is_numeric(words: list[str]) -> bool:
 
 def split_row(line: str, delimiter: str | None) -> list[str]:
     """Split a line without its comment, with decimal points; no words if the delimiter does not fit."""
-    line = _unquoted(_unmarked(line.replace("#N/A", "")), delimiter).split("#")[0].split("//")[0].strip(" ")
+    line = _unquoted(line.replace("#N/A", ""), delimiter).split("#")[0].split("//")[0].strip(" ")
     if delimiter is None and re.search(r"\s,|,\s|,$", line):
         return []
     if delimiter != ",":
         line = line.replace(",", ".")
     return [word.strip() for word in line.split(delimiter)]
-
-
-def _unmarked(text: str) -> str:
-    """Return text with NaN and infinity as numpy reads them: in 1.#QNAN stands a # that begins no comment."""
-    marked = "#" in text or "(" in text
-    return _MARKED.sub(lambda match: "inf" if match[1] else "nan", text) if marked else text
 
 
 def _unquoted(text: str, delimiter: str | None) -> str:
@@ -175,10 +168,9 @@ def _plain(lines: list[str], delimiter: str | None) -> list[str]:
     """Return lines as numpy reads them: comments by # only, decimal points, and no quotes."""
     if delimiter is not None and any(map(str.isspace, lines)):
         lines = ["" if line.isspace() else line for line in lines]
-    given = "\n".join(lines)
-    text = _unmarked(given)
+    text = "\n".join(lines)
     slashes, commas, quotes = "//" in text, delimiter != "," and "," in text, '"' in text
-    if not (slashes or commas or quotes) and text is given:
+    if not (slashes or commas or quotes):
         return lines
     text = _unquoted(text, delimiter)
     if slashes:

@@ -1,15 +1,17 @@
 """Text in blocks of lines: all lines of a file at once would need many times its size."""
 
 import codecs
+import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import IO, AnyStr
+from typing import TextIO
 
 from ..errors import InvalidPointsError
 
 _BLOCK = 2**16  # characters that are read at once
 _LONGEST = 100_000  # characters of a line, thousands of columns
 _BRIEF = 100  # characters of a quotation in a message
+_MARKED = re.compile(r"1\.?#(?:(INF)|QNAN|SNAN|IND|NAN)\d*|nan\(\w*\)", re.IGNORECASE)  # as Visual C writes them
 
 
 def read_text(path: Path, skipped: tuple[str, ...] = ()) -> Iterator[list[str]]:
@@ -31,12 +33,13 @@ def _encoding(path: Path) -> str:
     return "utf-8-sig"
 
 
-def read_blocks(file: IO[AnyStr], path: Path, skipped: tuple[AnyStr, ...] = ()) -> Iterator[list[AnyStr]]:
-    """Yield lists of lines, without their ends, of an open file of characters or bytes.
+def read_blocks(file: TextIO, path: Path, skipped: tuple[str, ...] = ()) -> Iterator[list[str]]:
+    """Yield lists of lines, without their ends, of an open file of text, with NaN and infinity as numpy reads them.
 
     Parameters
     ----------
     file : file object
+        Of which each end of a line is read as \\n.
     path : pathlib.Path
         Its name, for the text of the error.
     skipped : tuple of str
@@ -49,15 +52,21 @@ def read_blocks(file: IO[AnyStr], path: Path, skipped: tuple[AnyStr, ...] = ()) 
     """
     while block := file.read(_BLOCK):
         end = file.readline(_LONGEST)
-        lines = (block + end).splitlines()
+        lines = _unmarked(block + end).splitlines()
         if max(map(len, lines)) >= _LONGEST:
             if any(len(line) >= _LONGEST and not line.startswith(skipped) for line in lines):
                 raise InvalidPointsError(
                     f"{path} has a line of {_LONGEST:,} characters or more, which is not a point. Export it again."
                 )
-            while len(end) == _LONGEST and end[-1] not in ("\n", ord("\n")):
+            while len(end) == _LONGEST and end[-1] != "\n":
                 end = file.readline(_LONGEST)
         yield lines
+
+
+def _unmarked(text: str) -> str:
+    """Return text with NaN and infinity as numpy reads them: in 1.#QNAN stands a # that begins no comment."""
+    marked = "#" in text or "(" in text
+    return _MARKED.sub(lambda match: "inf" if match[1] else "nan", text) if marked else text
 
 
 def is_number(word: str) -> bool:

@@ -1,6 +1,9 @@
 """PLY, the Stanford polygon format: the vertices and their properties, in text or binary."""
 
+import os
 from collections.abc import Iterator, Sequence
+from functools import partial
+from itertools import islice, takewhile
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
@@ -10,7 +13,7 @@ from ..errors import InvalidPointsError
 from ..types import Array, Ints
 from .ascii_words import ascii_words
 from .lines import brief
-from .ply_lists import Code, end_of_records, read_fixed
+from .ply_lists import Code, end_of_records, first_list, read_fixed
 from .polygons import triangles
 from .ranges import ColumnPieces, Columns, Range, ranges_of
 from .rows import read_records, read_rows, record_blocks
@@ -23,7 +26,9 @@ _TYPES |= {np.dtype(code).name: code for code in (*_CODES, "i8", "u8")}  # int8,
 _TYPES["bool"] = "u1"
 _ORDERS = {"ascii": None, "binary_little_endian": "<", "binary_big_endian": ">"}
 _LONGEST = 1000  # characters of a line of the header, and lines
+_CORNERS = ("vertex_indices", "vertex_index")  # the list of a face
 _MOST_DIGITS = 15  # of a count
+_PADDING = 2  # bytes that may follow all elements: the end of a line
 
 
 class _Element(NamedTuple):
@@ -81,11 +86,14 @@ def read_ply(path: Path) -> PointTable:
 def read_vertex_columns(path: Path) -> PlyVertices:
     """Read the vertices of a PLY file in its types; errors as of `read_ply`."""
     with open(path, "rb") as file:
-        order, before, vertex, comments, notices = _read_vertex(file, path)
+        order, before, vertex, after, comments, notices = _read_vertex(file, path)
         if order is None:
-            columns = read_rows(file, vertex.codes, vertex.count, path, sum(element.count for element in before))
+            skipped = sum(element.count for element in before)
+            columns = read_rows(file, vertex.codes, vertex.count, path, skipped, None if after else notices)
         else:
-            columns = _read_binary(file, order, before, vertex, path)
+            begin = _end(file, order, before, path)
+            notices += _rest_notices(file, begin, order, vertex, after, path)
+            columns = _read_binary(file, begin, order, vertex, path)
     single = [name for name in vertex.names if name not in vertex.lists]
     return PlyVertices(dict(zip(single, columns, strict=True)), order, comments, notices)
 
@@ -106,11 +114,11 @@ def ply_pieces(path: Path, size: int, notices: list[str]) -> Iterator[tuple[Poin
         None where the file can only be read as a whole: it is text, or has lists at its vertices.
     """
     with open(path, "rb") as file:
-        order, before, vertex, _, found = _read_vertex(file, path)
+        order, before, vertex, after, _, found = _read_vertex(file, path)
         if order is None or vertex.lists:
             return None
         begin = _end(file, order, before, path)
-    notices += found
+        notices += [*found, *_rest_notices(file, begin, order, vertex, after, path)]
     return _vertex_pieces(path, begin, order, vertex, size)
 
 
@@ -124,24 +132,62 @@ def _vertex_pieces(
             yield gather_columns(dict(zip(vertex.names, _columns(rows, codes), strict=True)), path)
 
 
-def _read_vertex(file: BinaryIO, path: Path) -> tuple[str | None, list[_Element], _Element, list[str], list[str]]:
-    """Read the header: order of bytes, elements before the vertices, these, comments, and what is left out."""
+def _read_vertex(
+    file: BinaryIO, path: Path
+) -> tuple[str | None, list[_Element], _Element, list[_Element], list[str], list[str]]:
+    """Read the header: order of bytes, elements before the vertices, these, those after, comments, what is left out."""
     order, elements, comments = _read_header(file, path)
     names = [element.name for element in elements]
     if "vertex" not in names:
         raise InvalidPointsError(
             f"{path} has no vertices, only {brief(', '.join(names)) or 'nothing'}. It holds no points."
         )
-    vertex = elements[names.index("vertex")]
-    before = [element for element in elements[: names.index("vertex")] if element.count]
+    place = names.index("vertex")
+    vertex = elements[place]
+    before, after = (
+        [element for element in part if element.count] for part in (elements[:place], elements[place + 1 :])
+    )
     notices = [
         f"{path.name}: left out {element.count} {brief(element.name)} elements. Only points are read."
-        for element in elements
-        if element is not vertex and element.count
+        for element in (*before, *after)
     ]
     if vertex.lists:
         notices.append(f"{path.name}: left out {brief(', '.join(vertex.lists))}, lists of numbers at each point.")
-    return order, before, vertex, comments, notices
+    return order, before, vertex, after, comments, notices
+
+
+def _rest_notices(
+    file: BinaryIO, begin: int, order: str, vertex: _Element, after: list[_Element], path: Path
+) -> list[str]:
+    """Report bytes that no element names; refuse a file where each point has some of them, for these are between."""
+    if vertex.lists or not vertex.count:
+        return []
+    end = end_of_records(file, begin, order, vertex.types, vertex.count, path)
+    told = (end - begin) // vertex.count
+    lists = next((index for index, element in enumerate(after) if element.lists), len(after))
+    for element in after[:lists]:
+        end = end_of_records(file, end, order, element.types, element.count, path)
+    left = file.seek(0, os.SEEK_END) - end
+    if lists < len(after) and left > 0:  # whose end only a look at all of them would tell
+        name, code = after[lists].names[0], after[lists].types[0]
+        corners = first_list(file, end, order, code) if name in _CORNERS and isinstance(code, tuple) else np.zeros(1)
+        if not (len(corners) and ((corners >= 0) & (corners < vertex.count)).all()):
+            raise InvalidPointsError(
+                f"{path}: its first face has corners that are no points, so each point is longer than the {told} bytes"
+                " that its header names, and their places would be wrong. Export it again, as text, if possible."
+            )
+    if lists < len(after) or left <= _PADDING:
+        return []
+    if left % vertex.count == 0:
+        raise InvalidPointsError(
+            f"{path}: {left:,} bytes follow the last point, so each of its {vertex.count:,} points has"
+            f" {told + left // vertex.count} bytes where its header names {told}, and their places would be wrong."
+            " Export it again, as text, if possible."
+        )
+    return [
+        f"{path.name}: {left:,} bytes follow the last of the {vertex.count:,} points that its header names, and are"
+        " left out. If these are points, too, correct their number in the header."
+    ]
 
 
 def read_vertex_names(path: Path) -> list[str]:
@@ -177,7 +223,7 @@ def read_elements(path: Path) -> tuple[str | None, list[str], dict[str, dict[str
             if order is None:
                 columns = read_rows(file, element.codes, element.count, path, sum(each.count for each in before))
             else:
-                columns = _read_binary(file, order, before, element, path)
+                columns = _read_binary(file, _end(file, order, before, path), order, element, path)
             found[element.name] = dict(zip(element.names, columns, strict=True))
             before.append(element)
     return order, comments, found
@@ -185,13 +231,14 @@ def read_elements(path: Path) -> tuple[str | None, list[str], dict[str, dict[str
 
 def _read_header(file: BinaryIO, path: Path) -> tuple[str | None, list[_Element], list[str]]:
     """Return the byte order, None for text, the elements and comments; leave the file where the data begin."""
-    if file.readline(_LONGEST).strip() != b"ply":
+    lines = _header_lines(file)
+    if next(lines).strip() != b"ply":
         raise InvalidPointsError(f"{path} is no PLY file: its first line is not 'ply'. Export it again.")
     order: str | None = ""
     elements: list[_Element] = []
     comments: list[str] = []
     for number in range(2, _LONGEST):
-        line = file.readline(_LONGEST).decode(errors="replace").strip()
+        line = next(lines).decode(errors="replace").strip()
         match line.split():
             case ["end_header"]:
                 if order == "":
@@ -216,9 +263,18 @@ def _read_header(file: BinaryIO, path: Path) -> tuple[str | None, list[_Element]
     raise InvalidPointsError(f"{path} has a header without an end. Export it again.")
 
 
-def _read_binary(file: BinaryIO, order: str, before: list[_Element], vertex: _Element, path: Path) -> list[Array]:
-    """Read the columns of an element after those before it."""
-    begin = _end(file, order, before, path)
+def _header_lines(file: BinaryIO) -> Iterator[bytes]:
+    """Yield the lines of a header, which all end as the first does: those of Rhino in a carriage return alone."""
+    first = file.readline(_LONGEST)
+    alone = b"\r" in first.rstrip(b"\r\n")
+    file.seek(0)
+    while True:
+        letters = islice(iter(partial(file.read, 1), b""), _LONGEST)
+        yield b"".join(takewhile(b"\r".__ne__, letters)) if alone else file.readline(_LONGEST)
+
+
+def _read_binary(file: BinaryIO, begin: int, order: str, vertex: _Element, path: Path) -> list[Array]:
+    """Read the columns of an element."""
     if vertex.lists:
         return read_fixed(file, begin, order, vertex.types, vertex.count, path)
     codes = [code for code in vertex.codes if code is not None]

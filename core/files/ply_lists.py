@@ -17,6 +17,7 @@ Code: TypeAlias = str | tuple[str, str]  # of a number, or of the length and the
 Part: TypeAlias = tuple[list[str], tuple[str, str] | None]
 
 _BLOCK = 2**16  # records that are found before their numbers are read
+_LONGEST = 1000  # numbers of a list that are looked at
 
 
 def read_fixed(file: BinaryIO, begin: int, order: str, types: Sequence[Code], count: int, path: Path) -> list[Array]:
@@ -68,6 +69,15 @@ def end_of_records(file: BinaryIO, begin: int, order: str, types: Sequence[Code]
     for done in range(0, count, _BLOCK):
         _, place = _walk(data, place, order, _divide(types), min(_BLOCK, count - done), path, (done, count))
     return begin + place
+
+
+def first_list(file: BinaryIO, begin: int, order: str, code: tuple[str, str]) -> Ints:
+    """Return the numbers of the list with which the first record begins; fewer where the file ends before."""
+    size, item = (np.dtype(order + part) for part in code)
+    file.seek(begin)
+    count = np.frombuffer(file.read(size.itemsize).ljust(size.itemsize, b"\0"), size)[0]
+    found = np.frombuffer(file.read(item.itemsize * min(max(int(count), 0), _LONGEST)), np.uint8)
+    return found[: len(found) // item.itemsize * item.itemsize].view(item).astype(np.int64)
 
 
 def _rest(file: BinaryIO, begin: int, types: Sequence[Code], count: int, path: Path) -> bytes:

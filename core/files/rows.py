@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Iterator, Sequence
-from itertools import chain, groupby, islice
+from itertools import accumulate, chain, groupby, islice
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -46,8 +46,15 @@ def record_blocks(
         yield np.fromfile(file, record, min(size, count - done))
 
 
-def read_rows(file: BinaryIO, types: Sequence[str | None], count: int, path: Path, skipped: int = 0) -> list[Array]:
-    """Read the columns of the rows of text from here on.
+def read_rows(
+    file: BinaryIO,
+    types: Sequence[str | None],
+    count: int,
+    path: Path,
+    skipped: int = 0,
+    notices: list[str] | None = None,
+) -> list[Array]:
+    """Read the columns of the rows of text from here on, each of one line, or of several as librealsense writes them.
 
     Parameters
     ----------
@@ -61,6 +68,8 @@ def read_rows(file: BinaryIO, types: Sequence[str | None], count: int, path: Pat
         The file, for the texts of errors.
     skipped : int
         How many rows stand before them.
+    notices : list of str, optional
+        Where they are the last ones: gets whether more lines follow.
 
     Returns
     -------
@@ -68,13 +77,25 @@ def read_rows(file: BinaryIO, types: Sequence[str | None], count: int, path: Pat
         The columns that are no lists.
     """
     begin, codes = file.tell(), [code for code in types if code is not None]
+    further: list[str] = []
 
-    def rows() -> Iterator[bytes]:
-        """Return the lines of the points from the first on; there may be fewer than the header names."""
-        file.seek(begin)
-        filled = filter(bytes.strip, chain.from_iterable(read_blocks(file, path)))
-        lines = islice(filled, skipped, skipped + count)
-        return lines if None not in types else _without_lists(lines, types, path)
+    def filled() -> Iterator[str]:
+        """Yield the lines from the first point on, and those of whatever follows."""
+        with open(path, encoding="ascii", errors="replace") as text:
+            text.seek(begin)
+            yield from islice(filter(str.strip, chain.from_iterable(read_blocks(text, path))), skipped, None)
+
+    width = 1 if None in types else _lines_of_row(filled(), len(types))
+
+    def rows() -> Iterator[str]:
+        """Yield a line for each point; there may be fewer than the header names."""
+        lines = filled()
+        points = islice(lines, count * width)
+        if None in types:
+            yield from _without_lists(points, types, path)
+        else:
+            yield from points if width == 1 else map(" ".join, zip(*[points] * width, strict=False))
+        further[:] = islice(lines, 1)
 
     lines = rows()
     line = next(lines, None)
@@ -82,7 +103,7 @@ def read_rows(file: BinaryIO, types: Sequence[str | None], count: int, path: Pat
         values = np.empty((0, len(codes)))
     else:
         try:
-            values = np.loadtxt(chain([line], lines), ndmin=2, comments=None, encoding="ascii")
+            values = np.loadtxt(chain([line], lines), ndmin=2, comments=None)
         except ValueError:
             _refuse_row(rows(), len(codes), path)
             raise
@@ -90,13 +111,24 @@ def read_rows(file: BinaryIO, types: Sequence[str | None], count: int, path: Pat
         _refuse_row(rows(), len(codes), path)
     if len(values) < count:
         raise too_short(path, len(values), count)
+    if notices is not None and further:
+        notices.append(
+            f"{path.name}: left out all lines after those of the {count} points that its header names, from"
+            f" {brief(repr(further[0].strip()))} on. If these are points, too, correct their number in the header."
+        )
     return [
         _load_whole(rows(), index, code) if _is_long(column, code) else _typed(column, code)
         for index, (column, code) in enumerate(zip(values.T, codes, strict=True))
     ]
 
 
-def _without_lists(lines: Iterator[bytes], types: Sequence[str | None], path: Path) -> Iterator[bytes]:
+def _lines_of_row(lines: Iterator[str], width: int) -> int:
+    """Return how many lines hold so many numbers; one where they do not end with a line."""
+    ends = accumulate(len(line.split()) for line in lines)
+    return next((number if end == width else 1 for number, end in enumerate(ends, start=1) if end >= width), 1)
+
+
+def _without_lists(lines: Iterator[str], types: Sequence[str | None], path: Path) -> Iterator[str]:
     """Yield lines without their lists: each is a number of numbers, and these."""
     steps = [(len([*run]), is_list) for is_list, run in groupby(code is None for code in types)]
     for number, line in enumerate(lines, start=1):
@@ -107,14 +139,14 @@ def _without_lists(lines: Iterator[bytes], types: Sequence[str | None], path: Pa
                 place += length
                 continue
             for _ in range(length):
-                word = words[place] if place < len(words) else b""
+                word = words[place] if place < len(words) else ""
                 place += 1 + int(word) if word.isdigit() else len(words) + 1
         if place != len(words):
             raise InvalidPointsError(
                 f"{path}, point {number}: {len(words)} numbers, which are not those of its properties and lists."
                 " Correct the file."
             )
-        yield b" ".join(kept)
+        yield " ".join(kept)
 
 
 def _is_long(column: Floats, code: str) -> bool:
@@ -125,9 +157,9 @@ def _is_long(column: Floats, code: str) -> bool:
     return float(limits.min) <= column.min() and _EXACT <= np.abs(column).max() < float(limits.max)
 
 
-def _load_whole(lines: Iterator[bytes], index: int, code: str) -> Ints:
+def _load_whole(lines: Iterator[str], index: int, code: str) -> Ints:
     """Read a column of whole numbers as such."""
-    return np.loadtxt(lines, code, usecols=index, ndmin=1, comments=None, encoding="ascii")
+    return np.loadtxt(lines, code, usecols=index, ndmin=1, comments=None)
 
 
 def _typed(column: Floats, code: str) -> Array:
@@ -155,10 +187,10 @@ def too_short(path: Path, found: int, count: int) -> InvalidPointsError:
     )
 
 
-def _refuse_row(lines: Iterator[bytes], width: int, path: Path) -> None:
+def _refuse_row(lines: Iterator[str], width: int, path: Path) -> None:
     """Report which of some lines does not hold so many numbers."""
     for number, line in enumerate(lines, start=1):
-        words = line.decode("ascii", errors="replace").split()
+        words = line.split()
         odd = next((word for word in words if not is_number(word)), None)
         if len(words) != width:
             wrong = f"{len(words)} numbers where the header names {width} properties"

@@ -1,0 +1,166 @@
+"""Files as programs write them beside the rules of their formats: read rightly, or told as what they are."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from core import PointCloudError
+from core.files import chunks, join_pieces, read_points
+
+COUNT = 8_000  # lines of more than one block
+POINTS = np.round(np.random.default_rng(0).uniform(-5.0, 5.0, (COUNT, 3)), 3)
+NORMALS = np.random.default_rng(1).normal(size=(COUNT, 3))
+NORMALS /= np.linalg.norm(NORMALS, axis=1)[:, None]
+COLORS = np.random.default_rng(2).integers(0, 256, (COUNT, 3))
+
+
+def in_pieces(path, size=1500):
+    pieces = chunks(path, size)
+    table = join_pieces([*pieces], path, pieces.single, pieces.degrees)
+    table.notices = pieces.notices + table.notices
+    return table
+
+
+def both_ways(path):
+    """Return the table of a file, which is that of its pieces."""
+    table, other = read_points(path), in_pieces(path)
+    assert_array_equal(table.points, other.points)
+    if table.colors is None:
+        assert other.colors is None
+    else:
+        assert_array_equal(table.colors, other.colors)
+    for name, values in table.attributes.items():
+        assert_array_equal(values, other.attributes[name])
+    assert [text for text in table.notices if text not in other.notices] == []
+    return table
+
+
+class TestPly:
+    def make(self, kind, properties, *elements, end="\n", count=COUNT):
+        lines = ["ply", f"format {kind} 1.0", "comment made", f"element vertex {count}"]
+        return end.join([*lines, *(f"property {text}" for text in properties), *elements, "end_header", ""]).encode()
+
+    @pytest.mark.parametrize("kind", ["ascii", "binary_little_endian", "binary_big_endian"])
+    @pytest.mark.parametrize("end", ["\r", "\n", "\r\n", "\r\r\n"])
+    def test_ends_of_lines(self, tmp_path, kind, end):
+        """Rhino ends lines by a carriage return alone, behind which the first byte may be that of a new line."""
+        places = POINTS.copy()
+        places[0, 0] = np.frombuffer(b"\n\0\0\0\0\0\xe0\x3f", "<f8" if "little" in kind else ">f8")[0]
+        rows = np.concatenate([places, COLORS], axis=1)
+        order = ">" if "big" in kind else "<"
+        record = np.dtype([(name, order + "f8") for name in "xyz"] + [(name, "u1") for name in ("r", "g", "b")])
+        if kind == "ascii":
+            data = "".join("{!r} {!r} {!r} {:.0f} {:.0f} {:.0f}{}".format(*row, end) for row in rows.tolist()).encode()
+        else:
+            data = np.array([*map(tuple, rows)], record).tobytes()
+        names = [*(f"double {axis}" for axis in "xyz"), *(f"uchar {name}" for name in ("red", "green", "blue"))]
+        (tmp_path / "a.ply").write_bytes(self.make(kind, names, end=end) + data)
+        table = both_ways(tmp_path / "a.ply")
+        assert_array_equal(table.points, places)
+        assert_allclose(table.colors[:, :3], COLORS / 255.0, atol=1e-7)
+        assert table.notices == []
+
+    @pytest.mark.parametrize("parts", [(3, 3, 3), (3, 6), (6, 3), (2, 4, 3), (9,)])
+    @pytest.mark.parametrize("faces", [0, 2])
+    def test_a_point_on_several_lines(self, tmp_path, parts, faces):
+        names = [f"float {name}" for name in ("x", "y", "z", "nx", "ny", "nz")]
+        names += [f"uchar {name}" for name in ("red", "green", "blue")]
+        more = [f"element face {faces}", "property list uchar int vertex_indices"] if faces else []
+        words = [
+            [*map(repr, row[:6]), *(f"{value:.0f}" for value in row[6:])]
+            for row in np.concatenate([POINTS, NORMALS, COLORS], axis=1).tolist()
+        ]
+        ends = [0, *np.cumsum(parts)]
+        lines = (" ".join(row[a:b]) + " \n" for row in words for a, b in pairwise(ends))
+        data = "".join(lines) + "3 0 1 2 \n" * faces
+        (tmp_path / "a.ply").write_bytes(self.make("ascii", names, *more) + data.encode())
+        table = both_ways(tmp_path / "a.ply")
+        assert_array_equal(table.points, POINTS)
+        assert_array_equal(table.attributes["normal"], NORMALS)
+        assert_allclose(table.colors[:, :3], COLORS / 255.0, atol=1e-7)
+
+    @pytest.mark.parametrize("line", ["1 2 3 4", "1 2 3 4 5", "1 2 3"])
+    def test_rows_without_some_of_the_numbers_are_no_points_on_several_lines(self, tmp_path, line):
+        names = [f"float {name}" for name in ("x", "y", "z", "nx", "ny", "nz")]
+        more = ("element face 9", "property list uchar int vertex_indices")
+        data = (line + "\n") * 10 + "4 0 1 2 3\n" * 9
+        (tmp_path / "a.ply").write_bytes(self.make("ascii", names, *more, count=10) + data.encode())
+        with pytest.raises(PointCloudError, match="Correct the file|Copy or save it again"):
+            read_points(tmp_path / "a.ply")
+
+    @pytest.mark.parametrize("order", ["<", ">"])
+    @pytest.mark.parametrize("longer", [2, 4, 8])
+    @pytest.mark.parametrize("faces", [0, 5])
+    def test_points_longer_than_the_header_names_are_refused(self, tmp_path, order, longer, faces):
+        rows = np.zeros(300, [("place", order + "f4", 3), ("more", "u1", longer)])
+        rows["place"], rows["more"] = POINTS[:300], 63
+        more = [f"element face {faces}", "property list uchar uint vertex_indices"] if faces else []
+        kind = "binary_little_endian" if order == "<" else "binary_big_endian"
+        head = self.make(kind, [f"float {axis}" for axis in "xyz"], *more, count=300)
+        corners = (bytes([3]) + np.arange(3, dtype=order + "u4").tobytes()) * faces
+        (tmp_path / "a.ply").write_bytes(head + rows.tobytes() + corners)
+        for read in (read_points, in_pieces):
+            with pytest.raises(PointCloudError, match="places would be wrong"):
+                read(tmp_path / "a.ply")
+        (tmp_path / "a.ply").write_bytes(head + rows["place"].tobytes() + corners)
+        assert_array_equal(both_ways(tmp_path / "a.ply").points, rows["place"])
+
+    @pytest.mark.parametrize("kind", ["ascii", "binary_little_endian"])
+    def test_more_points_than_the_header_names_are_told(self, tmp_path, kind):
+        rows = POINTS[:300].astype("<f4")
+        data = (
+            rows.tobytes() if kind != "ascii" else "".join(f"{x!r} {y!r} {z!r}\n" for x, y, z in rows.tolist()).encode()
+        )
+        (tmp_path / "a.ply").write_bytes(self.make(kind, [f"float {axis}" for axis in "xyz"], count=290) + data)
+        table = both_ways(tmp_path / "a.ply")
+        assert_array_equal(table.points.astype(np.float32), rows[:290])
+        [notice] = table.notices
+        assert "of the 290 points that its header names" in notice
+        assert "correct their number in the header" in notice
+        (tmp_path / "a.ply").write_bytes(
+            self.make(kind, [f"float {axis}" for axis in "xyz"], count=300) + data + b"\r\n"
+        )
+        assert both_ways(tmp_path / "a.ply").notices == []
+
+
+@pytest.mark.parametrize("word", ["-nan(ind)", "nan(snan)", "-nan", "1.#QNAN", "-1.#IND00"])
+@pytest.mark.parametrize("kind", ["ply", "pcd", "xyz"])
+def test_nan_as_visual_c_writes_it(tmp_path, kind, word):
+    names = ("x", "y", "z", "nx", "ny", "nz")
+    if kind == "ply":
+        head = TestPly().make("ascii", [f"float {name}" for name in names]).decode()
+    elif kind == "pcd":
+        names = ("x", "y", "z", "normal_x", "normal_y", "normal_z")
+        head = f"VERSION 0.7\nFIELDS {' '.join(names)}\nSIZE 4 4 4 4 4 4\nTYPE F F F F F F\n"
+        head += f"WIDTH {COUNT}\nHEIGHT 1\nPOINTS {COUNT}\nDATA ascii\n"
+    else:
+        head = " ".join(names) + "\n"
+    rows = [
+        "{!r} {!r} {!r}".format(*row) + (f" {word}" * 3 if index % 50 == 3 else " 0 0 1")
+        for index, row in enumerate(POINTS.tolist())
+    ]
+    (tmp_path / f"a.{kind}").write_text(head + "\n".join(rows) + "\n")
+    table = both_ways(tmp_path / f"a.{kind}")
+    assert_array_equal(table.points, POINTS)
+    missing = np.arange(COUNT) % 50 == 3
+    assert np.isnan(table.attributes["normal"][missing]).all()
+    assert_array_equal(table.attributes["normal"][~missing], np.tile([0.0, 0.0, 1.0], (np.count_nonzero(~missing), 1)))
+
+
+@pytest.mark.parametrize("names", ["normalx normaly normalz", "NormalX NormalY NormalZ", "nx ny nz"])
+@pytest.mark.parametrize("suffix", [".ply", ".csv", ".pcd"])
+def test_names_of_normals(tmp_path, names, suffix):
+    count, rows = 200, np.concatenate([POINTS, NORMALS], axis=1)[:200]
+    words = ("x", "y", "z", *names.split())
+    head = {
+        ".ply": TestPly().make("ascii", [f"double {name}" for name in words], count=count).decode(),
+        ".csv": " ".join(words) + "\n",
+        ".pcd": f"FIELDS {' '.join(words)}\nSIZE{6 * ' 8'}\nTYPE{6 * ' F'}\nPOINTS {count}\nDATA ascii\n",
+    }
+    text = head[suffix] + "".join(" ".join(map(repr, row)) + "\n" for row in rows.tolist())
+    (tmp_path / f"a{suffix}").write_text(text)
+    table = both_ways(tmp_path / f"a{suffix}")
+    assert_array_equal(table.attributes["normal"], NORMALS[:count])
+    assert [*table.attributes] == ["normal"]
