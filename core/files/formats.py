@@ -42,6 +42,8 @@ _READERS = {
     ".ptx": read_ptx,
     ".csv": read_columns,
     ".txt": read_columns,
+    ".asc": read_columns,
+    ".grd": read_columns,
     ".npy": read_array,
     ".npz": read_array,
     ".las": read_las,

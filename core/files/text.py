@@ -13,6 +13,7 @@ from ..errors import InvalidPointsError
 from ..types import Array
 from .cells import Blocks, Rows, find_rows
 from .digits import shortest
+from .grid import find_grid, grid_pieces
 from .guess import Guess
 from .layout import Layout, find_layout, given_layout
 from .lines import is_number, read_text
@@ -40,8 +41,8 @@ def read_columns(path: Path, columns: str = "") -> PointTable:
 
     Columns are separated by semicolons, tabs, bars, white space or commas; beside commas, numbers have decimal
     points, otherwise points or commas. A line before the first point, marked as a comment or not, may name the columns;
-    without names the first three are x y z, and others colors or normals if they look like them. A PTX file by another
-    name is read as such.
+    without names the first three are x y z, and others colors or normals if they look like them. Grids of
+    heights, and a PTX file by another name, are read as such.
 
     Parameters
     ----------
@@ -108,6 +109,9 @@ def _pieces(
 ) -> Pieces | None:
     """Yield rows of numbers, in which columns without names have the usual ones for their number."""
     columns = columns.strip()
+    grid = None if columns else find_grid(path)
+    if grid is not None:
+        return grid_pieces(path, grid, size, notices)
     if not columns and holds_ptx(read_text(path, _SKIPPED)):
         return None
     rows = find_rows(blocks, path)

@@ -577,6 +577,8 @@ class TestMenus:
             ".ptx",
             ".csv",
             ".txt",
+            ".asc",
+            ".grd",
             ".npy",
             ".npz",
             ".pcd",

@@ -164,3 +164,92 @@ def test_names_of_normals(tmp_path, names, suffix):
     table = both_ways(tmp_path / f"a{suffix}")
     assert_array_equal(table.attributes["normal"], NORMALS[:count])
     assert [*table.attributes] == ["normal"]
+
+
+class TestGrids:
+    """Heights by rows and columns, of which every seventh has no data."""
+
+    COLUMNS, ROWS = 4001, 7  # rows of more than one block, and more characters than any line of points
+    HEIGHTS = np.round(np.random.default_rng(3).uniform(-9.0, 900.0, (ROWS, COLUMNS)), 12)
+    GAPS = np.arange(ROWS * COLUMNS).reshape(ROWS, COLUMNS) % 7 == 3
+
+    def rows(self, missing, upwards=False, wrap=None):
+        words = [
+            missing if gap else repr(height) for height, gap in zip(self.HEIGHTS.flat, self.GAPS.flat, strict=True)
+        ]
+        wrap = wrap or self.COLUMNS
+        rows = [" ".join(words[index : index + wrap]) for index in range(0, len(words), wrap)]
+        return "\n".join(rows[::-1] if upwards else rows) + "\n"
+
+    def check(self, path, west, north, step):
+        table = both_ways(path)
+        row, column = np.nonzero(~self.GAPS)
+        expected = {
+            (west + step * x, north - step * y): height
+            for x, y, height in zip(column.tolist(), row.tolist(), self.HEIGHTS[~self.GAPS].tolist(), strict=True)
+        }
+        assert {(x, y): z for x, y, z in table.points.tolist()} == expected
+        assert table.attributes == {}
+        [notice] = table.notices
+        assert f"{self.COLUMNS} x {self.ROWS} heights" in notice
+        assert f"left out {np.count_nonzero(self.GAPS):,} without data" in notice
+
+    @pytest.mark.parametrize("suffix", ["asc", "txt", "xyz", "grd"])
+    @pytest.mark.parametrize("place", ["corner", "center"])
+    @pytest.mark.parametrize(
+        ("missing", "word"), [("-9999", "-9999"), ("-9999", "-9999.00"), ("nan", "nan"), (None, "-9999")]
+    )
+    def test_esri(self, tmp_path, suffix, place, missing, word):
+        head = [f"NCOLS\t{self.COLUMNS}", f"nrows {self.ROWS}", f"xll{place} 350000.5", f"YLL{place.upper()} 5600000"]
+        head += ["dx 2", "dy 2"] if suffix == "txt" else ["cellsize 2.0"]
+        head += [f"NODATA_value {missing}"] if missing else []
+        (tmp_path / f"a.{suffix}").write_text("\r\n".join([*head, self.rows(word)]))
+        half = 1.0 if place == "corner" else 0.0
+        self.check(tmp_path / f"a.{suffix}", 350000.5 + half, 5600000 + half + 2.0 * (self.ROWS - 1), 2.0)
+
+    def test_rows_that_are_divided_and_decimal_commas(self, tmp_path):
+        head = f"ncols {self.COLUMNS}\nnrows {self.ROWS}\nxllcenter -3,5\nyllcenter 4\ncellsize 0,5\n"
+        (tmp_path / "a.asc").write_text(head + self.rows("-9999", wrap=13).replace(".", ","))
+        self.check(tmp_path / "a.asc", -3.5, 4.0 + 0.5 * (self.ROWS - 1), 0.5)
+
+    def test_surfer(self, tmp_path):
+        ends = f"-8 {-8 + 0.25 * (self.COLUMNS - 1)}\n4 {4 + 0.25 * (self.ROWS - 1)}\n-9 900\n"
+        rows = self.rows("1.70141e+038", upwards=True)
+        (tmp_path / "a.grd").write_text(f"DSAA\n{self.COLUMNS} {self.ROWS}\n{ends}{rows}")
+        self.check(tmp_path / "a.grd", -8.0, 4.0 + 0.25 * (self.ROWS - 1), 0.25)
+
+    HEAD = "ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n"
+
+    @pytest.mark.parametrize(
+        ("text", "told"),
+        [
+            (HEAD + "1 2 3\n4 5\n", "ends after 5 of its 6 heights"),
+            (HEAD + "1 2 3\n4 5 6 7\n", "more heights than those of its 3 columns and 2 rows"),
+            (HEAD + "1 2 3\n4 x 6\n", "is broken.*'x'"),
+            (HEAD + "1 2 3\n4" + "x" * 200_000, "text among its heights"),
+            (HEAD + "-9999 -9999 -9999\n-9999 -9999 -9999\n", "has no points"),
+            (HEAD.replace("cellsize 1\n", "") + "1 2 3\n4 5 6\n", "without a number dx or cellsize"),
+            (
+                HEAD.replace("xllcorner 0", "xllcorner inf") + "1 2 3\n4 5 6\n",
+                "without a number xllcorner or xllcenter",
+            ),
+            (HEAD.replace("ncols 3", "ncols -3") + "1 2 3\n4 5 6\n", "grid of -3 columns and 2 rows"),
+            ("DSAA\n3 2\n0 2\n0 1\n0\n1 2 3\n4 5 6\n", "two numbers each"),
+            ("DSBB\3\0\2\0", "binary grid of heights, as Surfer"),
+            ("CDF\1\0\0", "binary grid of heights, as NetCDF"),
+        ],
+    )
+    def test_grids_that_are_not_read(self, tmp_path, text, told):
+        (tmp_path / "a.grd").write_text(text)
+        for read in (read_points, in_pieces):
+            with pytest.raises(PointCloudError, match=told):
+                read(tmp_path / "a.grd")
+
+    def test_columns_called_asc(self, tmp_path):
+        """As scanners and CloudCompare call them, with the number of points."""
+        rows = "".join(f"{x} {y} {z} 200 100 {index % 256}\n" for index, (x, y, z) in enumerate(POINTS.tolist()))
+        (tmp_path / "a.asc").write_text(f"//X Y Z R G B\n{COUNT}\n" + rows)
+        table = both_ways(tmp_path / "a.asc")
+        assert_array_equal(table.points, POINTS)
+        assert_allclose(table.colors[:, 2], np.arange(COUNT) % 256 / 255.0, atol=1e-7)
+        assert table.notices == []

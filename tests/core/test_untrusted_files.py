@@ -116,6 +116,14 @@ def make_e57(count=30):
 
 PTX_HEAD = b"1\n30\n5 6 7\n1 0 0\n0 1 0\n0 0 1\n0 1 0 0\n-1 0 0 0\n0 0 1 0\n5 6 7 1\n"
 
+
+def make_heights():
+    """Thirty of them, in five rows."""
+    return "".join(
+        f"{height:.2f}{chr(10) if index % 6 == 5 else ' '}" for index, height in enumerate(POINTS[:30, 2])
+    ).encode()
+
+
 GOOD = {
     "ascii.ply": make_ply("ascii"),
     "little.ply": make_ply("little"),
@@ -125,6 +133,8 @@ GOOD = {
     "comma.csv": b"id,x,y,z,red,green,blue\n" + make_rows("1,{},{},{},255,0,51").encode(),
     "semicolon.csv": b"x;y;z\n" + make_rows("{};{};{}").replace(".", ",").encode(),
     "tab.txt": make_rows("{}\t{}\t{}", " // tree").encode(),
+    "grid.asc": b"ncols 6\nnrows 5\nxllcorner 1e5\nyllcorner 2.5\ncellsize 0.5\nNODATA_value -9999\n" + make_heights(),
+    "grid.grd": b"DSAA\n6 5\n-2 3\n0 4\n1 5\n" + make_heights(),
     "scan.pts": 2 * (b"30\n" + make_rows("{} {} {}", " -99 255 0 0").encode()),
     "scan.ptx": 2 * (PTX_HEAD + make_rows("{} {} {}", " 0.25 255 0 0").encode()),
     "thing.obj": b"o Thing\n" + make_rows("v {} {} {}", " 1 0 0").encode() + b"f 1 2 3\nf 4//2 5//2 6//2\n",
