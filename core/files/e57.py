@@ -15,8 +15,9 @@ from ..errors import InvalidPointsError
 from ..types import Array, Floats, Ints
 from .e57_bytes import PAGE, place_of, read_bytes, read_streams, unpack
 from .lines import brief
+from .pose import shift, turn
 from .rows import unpacks_too_far
-from .table import NORMAL, SCANNER, PointTable, full_color, unit_colors
+from .table import NORMAL, PointTable, full_color, unit_colors
 
 _HEAD = "<8sI12xQQQ"  # magic, version, offset and length of the description, size of a page
 _LONGEST = 32_000_000  # bytes of a description; that of a thousand scans has some millions
@@ -75,12 +76,21 @@ def e57_scans(path: Path, notices: list[str]) -> Iterator[PointTable]:
         places, missed = [place_of(scan.offset) for scan in scans], total
         # The same bytes are read for one scan only, or a small file could name them many times.
         ends = dict(reversed([*itertools.pairwise([*sorted(places), np.inf])]))
+        whole, extent = True, 0.0
         for index, (place, scan) in enumerate(zip(places, scans, strict=True)):
             table = _read_scan(file, place, ends[place], scan, path)
+            whole = whole and bool((table.points % 1.0 == 0.0).all())
+            extent = max(extent, *(float(np.ptp(axis)) for axis in table.points.T if len(axis)), 0.0)
+            _transform(table, scan.element)
             missed -= len(table.points)
             if len(scans) > 1:
                 table.attributes["scan"] = np.full(len(table.points), index, np.int32)
             yield table
+    if whole and extent:
+        notices.append(
+            f"{path.name}: all coordinates are whole numbers, up to {extent:,.0f} apart, which E57 counts in meters. If"
+            " they are millimeters, scale the points by 0.001."
+        )
     texts = {field.name: None for scan in scans for field in scan.fields if field.kind == "String"}
     if texts:
         notices.append(f"{path.name}: left out {brief(', '.join(texts))}, which holds no numbers.")
@@ -176,7 +186,6 @@ def _read_scan(file: BinaryIO, place: int, end: float, scan: _Scan, path: Path) 
         table.colors = _unit_colors(values, *np.transpose(limits))
     if fields.keys() >= set(_NORMALS):
         columns[NORMAL] = np.stack([columns.pop(name) for name in _NORMALS], axis=1)
-    _transform(table, scan.element)
     return table
 
 
@@ -218,22 +227,9 @@ def _unit_colors(values: Array, low: Floats, high: Floats) -> Array:
 def _transform(table: PointTable, scan: Element) -> None:
     """Transform points and normals by the pose of the scanner, if the file has it."""
     if scan.find("pose/rotation") is not None:
-        w, x, y, z = (_number(scan, f"pose/rotation/{name}") for name in "wxyz")
-        square = w * w + x * x + y * y + z * z
-        if not 0.0 < square < np.inf:
-            raise ValueError("a scan has an invalid rotation")
-        cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-        rotation = np.eye(3) + (2.0 / square) * (w * cross + cross @ cross)
-        table.points = table.points @ rotation.T
-        if NORMAL in table.attributes:
-            table.attributes[NORMAL] = (table.attributes[NORMAL] @ rotation.T).astype(np.float32)
+        turn(table, [_number(scan, f"pose/rotation/{name}") for name in "wxyz"])
     if scan.find("pose/translation") is not None:
-        position = np.array([_number(scan, f"pose/translation/{name}") for name in "xyz"])
-        if not np.isfinite(position).all():
-            raise ValueError("a scanner position is invalid")
-        table.points += position
-        table.attributes[SCANNER] = np.tile(position, (len(table.points), 1))
-        table.single = table.single and not position.any()
+        shift(table, np.array([_number(scan, f"pose/translation/{name}") for name in "xyz"]))
 
 
 def _number(scan: Element, path: str, default: float = 0.0) -> float:

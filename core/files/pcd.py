@@ -1,6 +1,7 @@
 """PCD, the point files of the Point Cloud Library: text, binary, or compressed by LZF."""
 
 import struct
+from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
@@ -8,9 +9,10 @@ import numpy as np
 
 from ..errors import InvalidPointsError
 from ..types import Array
-from .lines import brief
+from .lines import brief, is_number
+from .pose import shift, turn
 from .rows import read_records, read_rows, too_short
-from .table import PointTable, from_columns
+from .table import SCANNER, PointTable, from_columns
 
 _LONGEST = 10_000  # bytes of a line of the header; some have hundreds of fields
 _MOST_LINES = 100  # of the header
@@ -19,6 +21,7 @@ _WIDEST = 10_000  # numbers of a point
 _TYPES = {f"{kind} {size}": f"{kind.lower()}{size}" for kind in "IU" for size in (1, 2, 4, 8)}
 _TYPES |= {"F 4": "f4", "F 8": "f8"}
 _COLORS = ("rgb", "rgba")  # fields that hold a color in the bytes of one number
+_NOWHERE = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]  # position and rotation, w x y z, of sensors that no one placed
 _MOST_REPEATED = 88  # times that LZF may make data longer: three bytes repeat 264 at most
 
 
@@ -37,10 +40,12 @@ def read_pcd(path: Path) -> PointTable:
         It is no PCD file, or broken; the text says where.
     """
     with open(path, "rb") as file:
-        fields, count, kind = _read_header(file, path)
-        values = {"ascii": _read_text, "binary": _read_binary, "binary_compressed": _read_packed}[kind](
-            file, fields, count, path
-        )
+        fields, count, kind, viewpoint = _read_header(file, path)
+        notices: list[str] = []
+        if kind == "ascii":
+            values = _read_text(file, fields, count, path, notices)
+        else:
+            values = (_read_binary if kind == "binary" else _read_packed)(file, fields, count, path)
     left_out = [field.name for field in fields if field.count != 1 and field.name != "_"]
     columns = {
         field.name: column
@@ -52,13 +57,36 @@ def read_pcd(path: Path) -> PointTable:
             columns |= _split_color(columns.pop(name), alpha=name == "rgba")
             break
     table = from_columns(columns, path)
+    table.notices += [*notices, *_placed(table, viewpoint, path)]
     if left_out:
         table.notices.append(f"{path.name}: left out {brief(', '.join(left_out))}, with several numbers per point.")
     return table
 
 
-def _read_header(file: BinaryIO, path: Path) -> tuple[list[_Field], int, str]:
-    """Return the fields, the number of points and the kind of data; leave the file where the data begin."""
+def _placed(table: PointTable, viewpoint: list[str], path: Path) -> Iterator[str]:
+    """Transform a table by the position and rotation of the sensor, as viewers do, and report it unless it has none."""
+    numbers = [float(word) for word in viewpoint if is_number(word)]
+    if not viewpoint or numbers == _NOWHERE:
+        return
+    shown = brief(" ".join(viewpoint))
+    if (
+        len(numbers) != len(viewpoint)
+        or len(numbers) != len(_NOWHERE)
+        or not np.isfinite(numbers).all()
+        or not any(numbers[3:])
+    ):
+        yield f"{path.name}: VIEWPOINT {shown} is no position with a rotation, and not used. Correct it in the header."
+        return
+    turn(table, numbers[3:])
+    shift(table, np.array(numbers[:3]))
+    yield (
+        f"{path.name}: moved its points by VIEWPOINT {shown}, as viewers do; {SCANNER} is that position. If they were"
+        " in place before, let VIEWPOINT be 0 0 0 1 0 0 0 in the header."
+    )
+
+
+def _read_header(file: BinaryIO, path: Path) -> tuple[list[_Field], int, str, list[str]]:
+    """Return the fields, the number of points, the kind of data and the viewpoint; leave the file where data begin."""
     found: dict[str, list[str]] = {}
     for number in range(1, _MOST_LINES):
         line = file.readline(_LONGEST).decode(errors="replace").strip()
@@ -66,14 +94,14 @@ def _read_header(file: BinaryIO, path: Path) -> tuple[list[_Field], int, str]:
         match key:
             case _ if key.startswith("#"):
                 pass
-            case "FIELDS" | "SIZE" | "TYPE" | "COUNT":
+            case "FIELDS" | "SIZE" | "TYPE" | "COUNT" | "VIEWPOINT":
                 found[key] = words
             case "WIDTH" | "HEIGHT" | "POINTS" if len(words) == 1 and _is_count(words[0]):
                 found[key] = words
-            case "VERSION" | "VIEWPOINT":
+            case "VERSION":
                 pass
             case "DATA" if words in (["ascii"], ["binary"], ["binary_compressed"]):
-                return *_read_fields(found, path), words[0]
+                return *_read_fields(found, path), words[0], found.get("VIEWPOINT", [])
             case _:
                 raise InvalidPointsError(
                     f"{path}, line {number}: {line[:60]!r} is not valid in the header of a PCD file. Export it again."
@@ -104,9 +132,9 @@ def _read_fields(found: dict[str, list[str]], path: Path) -> tuple[list[_Field],
     return [_Field(name, code, int(number)) for name, code, number in zip(names, codes, counts, strict=True)], count
 
 
-def _read_text(file: BinaryIO, fields: list[_Field], count: int, path: Path) -> list[Array | None]:
+def _read_text(file: BinaryIO, fields: list[_Field], count: int, path: Path, notices: list[str]) -> list[Array | None]:
     types = [field.code for field in fields for _ in range(field.count)]
-    columns = read_rows(file, types, count, path)
+    columns = read_rows(file, types, count, path, notices=notices)
     firsts = np.cumsum([0] + [field.count for field in fields])
     return [columns[first] if field.count == 1 else None for field, first in zip(fields, firsts, strict=False)]
 

@@ -5,9 +5,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.spatial.transform import Rotation
 
 from core import PointCloudError
 from core.files import chunks, join_pieces, read_points
+from tests.core import e57_files
 
 COUNT = 8_000  # lines of more than one block
 POINTS = np.round(np.random.default_rng(0).uniform(-5.0, 5.0, (COUNT, 3)), 3)
@@ -253,3 +255,66 @@ class TestGrids:
         assert_array_equal(table.points, POINTS)
         assert_allclose(table.colors[:, 2], np.arange(COUNT) % 256 / 255.0, atol=1e-7)
         assert table.notices == []
+
+
+class TestViewpoints:
+    POSES = (((5.0, 0.0, 0.0), (0.5**0.5, 0.0, 0.0, 0.5**0.5)), ((1.5, -2.0, 300.0), (0.2, -0.4, 0.8, 1.6)))
+
+    def make(self, viewpoint, points, normals, kind="f4"):
+        names = ("x", "y", "z", "normal_x", "normal_y", "normal_z")
+        head = f"FIELDS {' '.join(names)}\nSIZE {' '.join(kind[1] * 6)}\nTYPE {' '.join('F' * 6)}\n"
+        rows = np.concatenate([points, normals], axis=1).astype(f"<{kind}")
+        head += f"WIDTH {len(rows)}\nHEIGHT 1\nVIEWPOINT {viewpoint}\nPOINTS {len(rows)}\nDATA binary\n"
+        return head.encode() + rows.tobytes()
+
+    @pytest.mark.parametrize("position", POSES)
+    @pytest.mark.parametrize("length", [1.0, 3.0])
+    def test_one_wall_from_two_places(self, tmp_path, position, length):
+        """The points as the sensor sees them are those of the wall, moved and turned back."""
+        place, quaternion = np.array(position[0]), np.array(position[1])
+        rotation = Rotation.from_quat(np.roll(quaternion, -1))
+        words = " ".join(map(repr, [*place.tolist(), *(length * quaternion).tolist()]))
+        seen = rotation.inv().apply(POINTS - place)
+        (tmp_path / "a.pcd").write_bytes(self.make(words, seen, rotation.inv().apply(NORMALS), "f8"))
+        table = both_ways(tmp_path / "a.pcd")
+        assert_allclose(table.points, POINTS, atol=1e-9)
+        assert_allclose(table.attributes["normal"], NORMALS, atol=1e-6)
+        assert_array_equal(table.attributes["scanner"], np.tile(place, (COUNT, 1)))
+        [notice] = table.notices
+        assert f"moved its points by VIEWPOINT {words}"[:90] in notice
+
+    @pytest.mark.parametrize("words", ["0 0 0 1 0 0 0", "0.0 0 0 1.0 0 -0 0"])
+    def test_a_sensor_that_no_one_placed(self, tmp_path, words):
+        (tmp_path / "a.pcd").write_bytes(self.make(words, POINTS, NORMALS, "f8"))
+        table = both_ways(tmp_path / "a.pcd")
+        assert_array_equal(table.points, POINTS)
+        assert [*table.attributes] == ["normal"]
+        assert table.notices == []
+
+    @pytest.mark.parametrize("words", ["1 2 3", "1 2 3 0 0 0 0", "1 2 3 nan 0 0 1", "here 0 0 1 0 0 0"])
+    def test_no_viewpoint(self, tmp_path, words):
+        (tmp_path / "a.pcd").write_bytes(self.make(words, POINTS, NORMALS, "f8"))
+        table = both_ways(tmp_path / "a.pcd")
+        assert_array_equal(table.points, POINTS)
+        [notice] = table.notices
+        assert f"VIEWPOINT {words} is no position with a rotation, and not used" in notice
+
+
+@pytest.mark.parametrize("kind", ["integer", "scaled", "f4", "f8"])
+def test_e57_of_whole_numbers_may_be_in_millimeters(tmp_path, kind):
+    places = np.round(1000.0 * POINTS)
+    for factor, told in ((1.0, True), (0.001, False)):
+        if kind in ("f4", "f8"):
+            fields = e57_files.points(places * factor, kind)
+        else:
+            make = {"integer": e57_files.integer, "scaled": e57_files.scaled}["scaled" if factor < 1.0 else kind]
+            limits = (-6000, 6000) if make is e57_files.integer else (-6000, 6000, factor, 0.0)
+            fields = {
+                f"cartesian{axis}": make(column.astype(int), *limits)
+                for axis, column in zip("XYZ", places.T, strict=True)
+            }
+        (tmp_path / "a.e57").write_bytes(e57_files.seal(e57_files.make_e57((fields, COUNT, ""))))
+        table = both_ways(tmp_path / "a.e57")
+        assert_allclose(table.points, places * factor, rtol=1e-6)
+        assert any("If they are millimeters, scale the points by 0.001" in text for text in table.notices) == told
+        assert len(table.notices) == told
