@@ -7,12 +7,13 @@ from typing import NamedTuple
 from ..errors import InvalidPointsError
 from .cells import Rows, is_numeric, kinds, split_row
 from .header import counts, find_names, names_places, unnamed
-from .lines import brief
+from .lines import brief, is_number
 from .names import Places, find_places, is_other
 
 _SKIPPED, _REST = "-", "..."  # among names that a user gives
 _GIVE = "If that is wrong, give the names of all columns in Columns at the import"
 _MOST_DIGITS = 15  # of a number of points
+_UNIT = 1.02  # to which numbers of unit vectors, rounded to a few digits, go
 
 
 class Layout(NamedTuple):
@@ -31,6 +32,8 @@ class Layout(NamedTuple):
         How many points the line before them announces.
     degrees : bool
         Whether x and y are angles.
+    usual : sequence of str
+        Names of all columns that have none, unless they hold normals; empty where no such names are known.
     """
 
     names: Sequence[str | None]
@@ -39,6 +42,7 @@ class Layout(NamedTuple):
     notices: list[str]
     announced: int | None = None
     degrees: bool = False
+    usual: Sequence[str] = ()
 
     def label(self, index: int) -> str:
         """Return the name of a column, or one by its number in the file."""
@@ -89,7 +93,7 @@ def find_layout(rows: Rows, usual: dict[int, tuple[str, ...]]) -> Layout:
     ----------
     rows : Rows
     usual : dict of int to tuple of str
-        Names for numbers of columns, where the text has none.
+        Names for numbers of columns, where the text has none: colors may be normals instead.
 
     Raises
     ------
@@ -102,19 +106,22 @@ def find_layout(rows: Rows, usual: dict[int, tuple[str, ...]]) -> Layout:
     if found and not found.sure:  # a column that counts the points is no coordinate
         found = find_places(names, [index for index in numeric if not counts(rows, index)]) or found
     notices = []
+    doubtful: Sequence[str] = ()
     if found:
         places = found.indices
         notices += _place_notices(found, names, rows.path)
     else:
         if names:
             _refuse_others(names, rows.path)
-        names = [*usual.get(rows.width, [None] * rows.width)]
+        given = usual.get(rows.width, ())
+        doubtful = given if "r" in given and _are_short(rows) else ()
+        names = [None] * rows.width if doubtful or not given else [*given]
         places = _first_places(rows, numeric)
     shortest = min(map(len, rows.sample))
     read = [index for index in numeric if index < len(names) and (names[index] or index < shortest)]
     sparse = [index for index in empty if index < len(names) and names[index] not in (None, unnamed(index))]
     others = [index for index in sorted(read + sparse) if index not in places]
-    layout = Layout(names, places, others, notices, _announced(rows), bool(found and found.degrees))
+    layout = Layout(names, places, others, notices, _announced(rows), bool(found and found.degrees), doubtful)
     notices += _text_notices([layout.label(index) for index in textual if index < len(names)], rows.path)
     if len(read) < len(numeric):
         notices.append(
@@ -157,6 +164,12 @@ def _refuse_others(names: Sequence[str | None], path: Path) -> None:
             f"{path} has no x y z among its columns {brief(', '.join(given))}. Give the names of all columns in Columns"
             " at the import, with x y z among them."
         )
+
+
+def _are_short(rows: Rows) -> bool:
+    """Whether the last three numbers of the first rows may be those of a unit vector."""
+    words = [word for row in rows.sample for word in row[-3:]]
+    return all(abs(float(word)) < _UNIT for word in words if is_number(word))
 
 
 def _first_places(rows: Rows, numeric: list[int]) -> list[int]:

@@ -1,6 +1,7 @@
 """Columns of numbers as text: XYZ, CSV, PTS, and the vertices of OBJ files."""
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import chain, islice
@@ -17,7 +18,7 @@ from .grid import find_grid, grid_pieces
 from .guess import Guess
 from .layout import Layout, find_layout, given_layout
 from .lines import is_number, read_text
-from .loading import load
+from .loading import Loaded, load
 from .names import standard_names
 from .ptx import holds_ptx, read_ptx
 from .ranges import ColumnPieces, Range, ranges_of
@@ -129,8 +130,13 @@ def _by_layout(rows: Rows, layout: Layout, size: int | None, notices: list[str])
         for _, others in loaded.pieces():
             guess.add(np.stack([others[index] for index in nameless.values()], axis=1))
         guessed = guess.names([*nameless], min(loaded.others) > max(layout.places))
+        normal = "nx" in guessed
+        if layout.usual:
+            left = zip(nameless.items(), guessed, strict=True)
+            guessed = [name if normal and name != label else layout.usual[index] for (label, index), name in left]
+        if normal or not layout.usual:
+            notices.append(_guess_notice(rows.path, layout.places, [*nameless], guessed))
         indices = _renamed(indices, dict(zip(nameless, guessed, strict=True)))
-        notices.append(_guess_notice(rows.path, layout.places, [*nameless], guessed))
     indices = _renamed(indices, standard_names(indices))
     if layout.announced not in (None, loaded.count):
         notices.append(f"{rows.path.name}: announces {layout.announced} points, but {loaded.count} lines follow.")
@@ -214,24 +220,37 @@ def read_vertices(path: Path) -> PointTable:
 
 def vertex_pieces(path: Path, size: int | None, notices: list[str]) -> Pieces:
     """Yield the vertices of an OBJ file, so many at once, as `column_pieces` does."""
-    faces = 0
+    faces, widths = 0, Counter[int]()
 
-    def blocks() -> Iterator[list[str]]:
-        """Yield the lines of vertices without their v, and empty ones in place of others."""
+    def blocks(missing: str = "") -> Iterator[list[str]]:
+        """Yield the lines of vertices without their v, and with what some lack; empty ones in place of others."""
         nonlocal faces
         faces = 0
+        widths.clear()
         for lines in read_text(path, ("#", "f", "l")):
             lines = [line.lstrip() for line in lines]
             faces += sum(line.startswith(("f ", "f\t", "l ", "l\t")) for line in lines)
-            yield [line[2:] if line.startswith(("v ", "v\t")) else "" for line in lines]
+            lines = [line[2:] if line.startswith(("v ", "v\t")) else "" for line in lines]
+            if any("#" in line for line in lines):
+                lines = [line.partition("#")[0] for line in lines]
+            widths.update(map(len, map(str.split, filter(None, lines))))
+            yield [line and line + missing for line in lines] if missing else lines
 
-    words = filter(None, (row.split("#")[0].split() for row in chain.from_iterable(blocks())))
-    rows = Rows(blocks, path, 0, None, [], [*islice(words, _SAMPLE)])
-    if not rows.sample:
-        raise InvalidPointsError(f"{path} has no vertices, which are lines that begin with v. It holds no points.")
-    names = _vertex_names(rows)
-    colors = [index for index, name in enumerate(names) if index > 2 and name != "w"]
-    loaded = load(rows, [0, 1, 2], colors, names.__getitem__, size)
+    def look(least: int, missing: str = "") -> tuple[list[str], Loaded]:
+        """Return the names of columns, by the vertices that have so many numbers, and these."""
+        words = (words for words in map(str.split, chain.from_iterable(blocks())) if len(words) >= least)
+        rows = Rows(partial(blocks, missing), path, 0, None, [], [*islice(words, _SAMPLE)])
+        if not rows.sample:
+            raise InvalidPointsError(f"{path} has no vertices, which are lines that begin with v. It holds no points.")
+        names = _vertex_names(rows)
+        colors = [index for index, name in enumerate(names) if index > 2 and name != "w"]
+        return names, load(rows, [0, 1, 2], colors, names.__getitem__, size)
+
+    names, loaded = look(1)
+    if max(widths) > 5 > min(widths):
+        bare = sum(count for width, count in widths.items() if width < 6)
+        notices.append(f"{path.name}: {bare:,} of {widths.total():,} vertices have no color. They are black.")
+        names, loaded = look(max(widths), " nan nan nan nan")
     notices += loaded.notices
     if faces:
         notices.append(f"{path.name}: left out {faces} faces and lines. Only points are read.")

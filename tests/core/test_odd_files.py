@@ -318,3 +318,61 @@ def test_e57_of_whole_numbers_may_be_in_millimeters(tmp_path, kind):
         assert_allclose(table.points, places * factor, rtol=1e-6)
         assert any("If they are millimeters, scale the points by 0.001" in text for text in table.notices) == told
         assert len(table.notices) == told
+
+
+@pytest.mark.parametrize("scanned", [False, True])
+@pytest.mark.parametrize("start", [0, 3])
+def test_normals_in_pts(tmp_path, scanned, start):
+    """Of six or seven columns without names; the first normals are zero, or have no number below."""
+    normals = NORMALS.copy()
+    normals[:150] = np.abs(normals[:150]) if start else 0.0
+    rows = [f"{x!r} {y!r} {z!r}" for x, y, z in POINTS.tolist()]
+    between = [f" {-index % 2000}" if scanned else "" for index in range(COUNT)]
+    parts = zip(rows, between, normals.tolist(), strict=True)
+    text = "".join("{}{} {:.6f} {:.6f} {:.6f}\n".format(row, more, *normal) for row, more, normal in parts)
+    (tmp_path / "a.pts").write_text(f"{COUNT}\n{text}")
+    table = both_ways(tmp_path / "a.pts")
+    assert_array_equal(table.points, POINTS)
+    assert table.colors is None
+    assert_allclose(table.attributes.pop("normal"), normals, atol=1e-6)
+    assert [*table.attributes] == (["intensity"] if scanned else [])
+    assert "column_6 as normals" in table.notices[0] or "column_7 as normals" in table.notices[0]
+
+
+@pytest.mark.parametrize("full", [1.0, 255.0])
+@pytest.mark.parametrize("dark", [0, 1, 500])
+def test_colors_in_pts_are_no_normals(tmp_path, full, dark):
+    """Nor where the first ones are black, or shares of one."""
+    colors = np.random.default_rng(4).integers(0, 10_000, (COUNT, 3)) / 1e4 if full == 1.0 else COLORS.astype(float)
+    colors[:dark] = 0.0
+    rows = zip(POINTS.tolist(), colors.tolist(), strict=True)
+    text = "".join("{!r} {!r} {!r} {:g} {:g} {:g}\n".format(*place, *color) for place, color in rows)
+    (tmp_path / "a.pts").write_text(f"{COUNT}\n{text}")
+    table = both_ways(tmp_path / "a.pts")
+    assert_allclose(table.colors[:, :3], colors / full, atol=1e-6)
+    assert table.attributes == {}
+    assert table.notices == []
+
+
+@pytest.mark.parametrize("first", ["bare", "colored", "late"])
+@pytest.mark.parametrize("weight", ["", " 1.0"])
+def test_obj_with_some_colors(tmp_path, first, weight):
+    """Wherever the first vertex with a color, or without one, is."""
+    colored = {"bare": np.arange(COUNT) > 0, "colored": np.arange(COUNT) < 1, "late": np.arange(COUNT) > 5000}[first]
+    colored[1000:3000:7] = first != "late"
+    rows = zip(POINTS.tolist(), (COLORS / 255.0).tolist(), colored.tolist(), strict=True)
+    text = "".join(
+        "v {!r} {!r} {!r}".format(*place) + weight + (" {:.6f} {:.6f} {:.6f}".format(*color) if there else "") + end
+        for (place, color, there), end in zip(rows, ["\n", " \n", " # v\n", "\nvn 0 0 1\n"] * (COUNT // 4), strict=True)
+    )
+    (tmp_path / "a.obj").write_text(text + "f 1 2 3\n")
+    table = both_ways(tmp_path / "a.obj")
+    assert_array_equal(table.points, POINTS)
+    assert_allclose(table.colors[:, :3], colored[:, None] * COLORS / 255.0, atol=1e-5)
+    assert_array_equal(table.colors[:, 3], 1.0)
+    assert table.attributes == {}
+    bare = np.count_nonzero(~colored)
+    assert table.notices == [
+        f"a.obj: {bare:,} of {COUNT:,} vertices have no color. They are black.",
+        "a.obj: left out 1 faces and lines. Only points are read.",
+    ]
