@@ -55,6 +55,7 @@ READABLE = tuple(_READERS)
 TEXTS = tuple(suffix for suffix, read in _READERS.items() if read in (read_columns, read_scan))  # rows of columns
 WRITABLE = (".ply", ".xyz", ".csv", *SCANS)
 SPLATS = (".splat", ".spz")  # of Gaussian splats alone, which core.splats reads
+_PACKED = (".ksplat", ".sog", ".lcc")  # of such, which other programs convert
 
 
 def read_points(path: Path, columns: str = "", las: LasChoices = LasChoices()) -> PointTable:
@@ -80,8 +81,14 @@ def read_points(path: Path, columns: str = "", las: LasChoices = LasChoices()) -
         file does not have.
     """
     suffix = path.suffix.lower()
+    _check_there(path)
     if suffix in SPLATS:
         raise PointCloudError(f"{path} is a file of Gaussian splats. Read it as such, by read_splats.")
+    if suffix in _PACKED:
+        raise PointCloudError(
+            f"{path} holds Gaussian splats in a form that is not read. Convert it to .ply by SuperSplat, or by"
+            f" PlayCanvas's splat-transform ({brief(f'splat-transform {path.name} {path.stem}.ply')})."
+        )
     if suffix not in _READERS:
         known = ", ".join((*READABLE, *SPLATS))
         raise PointCloudError(f"{path} is not a file with points. Give one of {known}.")
@@ -138,8 +145,7 @@ def reading(path: Path) -> Iterator[None]:
     PointCloudError
         There is no such file, or it is broken.
     """
-    if not os.path.isfile(path):  # that of pathlib fails at folders without permission
-        raise PointCloudError(f"There is no file {path}. Check its name and folder.")
+    _check_there(path)
     try:
         with np.errstate(invalid="ignore", over="ignore"):  # in numbers that are refused, or kept as infinite
             yield
@@ -155,6 +161,11 @@ def reading(path: Path) -> Iterator[None]:
         raise InvalidPointsError(
             f"{path} is broken: {brief(str(error).strip('.'))}. Copy or export it again."
         ) from error
+
+
+def _check_there(path: Path) -> None:
+    if not os.path.isfile(path):  # that of pathlib fails at folders without permission
+        raise PointCloudError(f"There is no file {path}. Check its name and folder.")
 
 
 def write_points(path: Path, table: PointTable, double: bool = True) -> list[str]:

@@ -44,7 +44,7 @@ from .columns import (
     stack,
 )
 from .harmonics import COUNTS
-from .layouts import completed, hold_enough, near_miss
+from .layouts import ANCHORS, are_anchors, completed, hold_enough, near_miss, remarks
 from .splats import Splats
 from .spz import is_spz, read_spz
 
@@ -109,7 +109,7 @@ def read_file(path: Path, read: Callable[[Path], PointTable] = read_points) -> P
     table = read(path)
     missing = near_miss((*PLACES, *table.attributes))
     if missing:
-        table.notices.append(f"{Path(path).name} looks like Gaussian splats, but has {missing}: read as plain points.")
+        table.notices.append(f"{Path(path).name} {missing}")
     return table
 
 
@@ -157,9 +157,10 @@ def _reader(path: Path) -> Callable[[Path], PlyVertices] | None:
 
 def _refuse(path: Path) -> NoReturn:
     """Report the missing properties of a file."""
-    missing = [name for name in NEEDED if name not in read_vertex_names(path)]
+    names = read_vertex_names(path)
+    missing = f"no {', '.join(name for name in NEEDED if name not in names)} among its properties"
     raise InvalidPointsError(
-        f"{path} holds no Gaussian splats: it has no {', '.join(missing)} among its properties. Give a file of splats:"
+        f"{path} holds no Gaussian splats: it has {ANCHORS if are_anchors(names) else missing}. Give a file of splats:"
         f" PLY, {', '.join(SPLATS)}."
     )
 
@@ -169,6 +170,7 @@ def _read_ply(path: Path) -> PlyVertices:
     vertices = read_vertex_columns(path)
     columns, guesses = completed(vertices.columns)
     notices = [f"{path.name}: {'; '.join(guesses)}. Export Splats writes the common layout."] if guesses else []
+    notices += [f"{path.name}: {text}" for text in remarks(list(vertices.columns))]
     return vertices._replace(columns=columns, notices=[*vertices.notices, *notices])
 
 

@@ -1,6 +1,6 @@
 """Layouts of vertices that are nearly those of trainers: whether they suffice for Gaussian splats, and completions."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -10,14 +10,32 @@ from .columns import COLORS, NEEDED, OPACITY, PLACES, ROTATIONS, SCALES, encode_
 from .harmonics import CONSTANT
 
 _RGB = (("red", "green", "blue"), ("r", "g", "b"))
+ANCHORS = "anchors of Scaffold-GS, Octree-GS or the like, from which a network makes splats and their colors"
+_UNUSED = (
+    (
+        "its splats move and have a life time",
+        ("motion_", "omega_", "trbf_"),
+        "as those of SpacetimeGaussians, which is not used: all are shown at once, each at the middle of its time."
+        " Export one moment by the program that trained them.",
+    ),
+    (
+        "its splats are bound to triangles",
+        ("binding_",),
+        "as those of GaussianAvatars, with places, sizes and rotations relative to these, which the file does not hold:"
+        " they are shown as they are stored. Export one pose by the program that trained them.",
+    ),
+)
 _THIN = 1e-3  # of the shorter axis in the plane: how thick a splat without a third axis becomes
 
 
 def hold_enough(names: Sequence[str]) -> bool:
     """Whether properties of these names suffice for splats: sizes, and opacities, colours or rotations.
 
-    Colours and rotations must be complete if there are any. One size suffices for balls, two for flat splats.
+    Colours and rotations must be complete if there are any. One size suffices for balls, two for flat splats. Anchors,
+    from which a network makes splats, are none.
     """
+    if are_anchors(names):
+        return False
     there = set(names)
     sizes = [name in there for name in SCALES]
     halves = [group for group in (COLORS, ROTATIONS) if there.intersection(group) not in (set(), set(group))]
@@ -25,11 +43,27 @@ def hold_enough(names: Sequence[str]) -> bool:
     return there.issuperset(PLACES) and sizes[0] and sizes[2] <= sizes[1] and not halves and bool(marks)
 
 
+def are_anchors(names: Sequence[str]) -> bool:
+    """Whether properties of these names are those of anchors, as of Scaffold-GS: features, and offsets of splats."""
+    return any(name.startswith(("f_anchor_feat", "f_offset")) for name in names)
+
+
 def near_miss(names: Sequence[str]) -> str:
-    """Return what is missing in a file that seems to hold splats but not enough of them; empty for other files."""
+    """Return why a file that seems to hold splats holds points only, after its name; empty for other files."""
+    if are_anchors(names):
+        return f"holds {ANCHORS}: read as plain points. Splats are what 3D Gaussian Splatting trains."
     if hold_enough(names) or not {COLORS[0], SCALES[0], ROTATIONS[0]}.intersection(names):
         return ""
-    return f"no {', '.join(name for name in NEEDED if name not in names)}"
+    missing = ", ".join(name for name in NEEDED if name not in names)
+    return f"looks like Gaussian splats, but has no {missing}: read as plain points."
+
+
+def remarks(names: Sequence[str]) -> Iterator[str]:
+    """Yield which properties of splats are not used, by their names, as clauses after the name of the file."""
+    for what, prefixes, text in _UNUSED:
+        found = [name for name in names if name.startswith(prefixes)]
+        if found:
+            yield f"{what} ({', '.join(found[:3])}{', ...' if len(found) > 3 else ''}), {text}"
 
 
 def completed(columns: dict[str, Array]) -> tuple[dict[str, Array], list[str]]:

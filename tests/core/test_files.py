@@ -285,8 +285,12 @@ def test_points_without_a_place_are_left_out(tmp_path, kind, missing):
     assert table.notices == [f"a.{kind}: left out 1 points that the sensor missed ({what})."]
 
 
-@pytest.mark.parametrize(("name", "text"), [("a.dxf", "not a file with points"), ("a.ply", "no file")])
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [("a.dxf", "not a file with points"), ("b.dxf", "There is no file"), ("b.ply", "There is no file")],
+)
 def test_files_that_are_not_read(tmp_path, name, text):
+    (tmp_path / "a.dxf").touch()
     with pytest.raises(PointCloudError, match=text):
         read_points(tmp_path / name)
 

@@ -336,8 +336,50 @@ def read_or_refuse(path):
 
 @pytest.mark.parametrize("suffix", SPLATS)
 def test_what_reads_points_says_what_reads_splats(tmp_path, suffix):
+    with pytest.raises(core.PointCloudError, match="There is no file"):
+        read_points(tmp_path / f"a{suffix}")
+    (tmp_path / f"a{suffix}").touch()
     with pytest.raises(core.PointCloudError, match="is a file of Gaussian splats. Read it as such, by read_splats"):
         read_points(tmp_path / f"a{suffix}")
+
+
+@pytest.mark.parametrize("suffix", [".ksplat", ".sog", ".SOG", ".lcc"])
+def test_splats_that_other_programs_convert(tmp_path, suffix):
+    (tmp_path / f"a{suffix}").touch()
+    for read in (read_points, read_file):
+        with pytest.raises(core.PointCloudError, match=rf"SuperSplat.*\(splat-transform a{suffix} a.ply\)\.$"):
+            read(tmp_path / f"a{suffix}")
+
+
+def write_more(path, names):
+    """Write splats with further columns."""
+    splat_files.write_ply(path, {**splat_files.some_columns(), **dict.fromkeys(names, np.ones(300, np.float32))})
+
+
+def test_anchors_are_points(tmp_path):
+    write_more(tmp_path / "a.ply", ["f_offset_0", *(f"f_anchor_feat_{i}" for i in range(32)), "scale_3", "scale_5"])
+    table = read_file(tmp_path / "a.ply")
+    assert isinstance(table, PointTable)
+    assert table.attributes.keys() >= {"f_offset_0", "f_anchor_feat_31", "scale_5"}
+    assert "a.ply holds anchors of Scaffold-GS, Octree-GS or the like" in table.notices[-1]
+    with pytest.raises(core.PointCloudError, match="holds no Gaussian splats: it has anchors"):
+        core.read_splats(tmp_path / "a.ply")
+
+
+@pytest.mark.parametrize(
+    ("names", "told"),
+    [
+        (("trbf_center", "trbf_scale"), "its splats move and have a life time (trbf_center, trbf_scale), as"),
+        ([f"motion_{i}" for i in range(9)], "(motion_0, motion_1, motion_2, ...), as those of SpacetimeGaussians"),
+        (("binding_0",), "its splats are bound to triangles (binding_0), as those of GaussianAvatars"),
+        (("nx", "ny", "nz", "filter_3D", "label"), ""),
+    ],
+)
+def test_splats_that_are_not_all_there_is(tmp_path, names, told):
+    write_more(tmp_path / "a.ply", names)
+    splats = core.read_splats(tmp_path / "a.ply")
+    assert [told in notice for notice in splats.notices] == [True] * bool(told)
+    assert splats.file.columns.keys() >= set(names)
 
 
 def test_splats_of_a_folder_are_frames(tmp_path):
