@@ -54,6 +54,37 @@ def check_vectors(vectors, name, where):
         )
 
 
+def seen_from(vectors, points, holds, name, where):
+    """Return from where points were seen, and notices of those of which no vector says it.
+
+    Parameters
+    ----------
+    vectors, points : ndarray, (n, 3)
+        In the same coordinates.
+    holds : str
+        A value of the setting.
+    name : str
+        Of the attribute.
+    where : str
+        Of what it is.
+
+    Returns
+    -------
+    ndarray, (n, 3)
+        Points without a vector are seen from themselves, which says nothing of their side.
+    list of str
+    """
+    there = np.isfinite(vectors).all(axis=1)
+    count, missing = len(there), int(np.count_nonzero(~there))
+    if missing == count:
+        raise core.PointCloudError(
+            f'The attribute "{name}" of {where} is NaN at all {count:,} points. Choose one that has vectors.'
+        )
+    places = np.where(there[:, None], vectors + points if holds == "DIRECTIONS" else vectors, points)
+    told = f'{where}: {missing:,} of {count:,} points have no "{name}" (NaN). They take the side of the others around.'
+    return places, [told] if missing else []
+
+
 def outward(points, normals, areas, method, viewpoint, flip, keep):
     """Return normals, (n, 3), on the side that settings name.
 

@@ -162,25 +162,26 @@ class Orient(ResultVerb):
 
     def wanted(self, cloud, own, arguments):
         if own.method == "VIEWPOINT":
-            return arguments.viewpoint - cloud.place
+            return arguments.viewpoint - cloud.place, []
         if own.method != "ATTRIBUTE":
-            return None
+            return None, []
         vectors = cloud.numbers(own.source, "--source").astype(np.float64)
         orienting.check_vectors(vectors, own.source, str(cloud.path))
-        return cloud.points + vectors if own.holds == "DIRECTIONS" else vectors - cloud.place
+        vectors -= cloud.place if own.holds == "POSITIONS" else 0.0
+        return orienting.seen_from(vectors, cloud.points, own.holds, own.source, cloud.path.name)
 
     def compute(self, built, wanted, name, own, progress):
-        laplacian = built.laplacian
+        laplacian, (viewpoint, notices) = built.laplacian, wanted
         progress("Orientation", 0.9)
         sides = orienting.outward(
             laplacian.points,
             laplacian.normals,
             laplacian.areas,
             own.method,
-            wanted,
+            viewpoint,
             own.flip,
             lambda method, viewpoint, compute: compute(),
         )
         turned = analysis.oriented(built, sides)
         values = {**turned.measures, ORIENTATION: turned.measures[NORMAL]}
-        return Told(values, [], orienting.reversed_line(None, sides, name))
+        return Told(values, notices, orienting.reversed_line(None, sides, name))

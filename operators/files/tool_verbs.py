@@ -271,10 +271,8 @@ class _OrientInFile(OrientNormals):
     """The same tool, with positions in the coordinates of the file, without the import offset."""
 
     place = None  # viewpoint, (3,), unless it is an object
-    shift = 0.0  # of positions in columns of the file
 
     def viewpoints(self, context, obj, reading):
         if self.method == "VIEWPOINT" and self.place is not None:
-            return self.place - place_of(obj)
-        found = super().viewpoints(context, obj, reading)
-        return found - self.shift if self.method == "ATTRIBUTE" and self.holds == "POSITIONS" else found
+            return self.place - place_of(obj), []
+        return super().viewpoints(context, obj, reading)

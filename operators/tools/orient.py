@@ -1,5 +1,7 @@
 """Orientation of the normals, for this and all later analyses."""
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, StringProperty
@@ -54,11 +56,12 @@ class OrientNormals(Tool):
         **orienting.ORIENT["holds"].keywords,
     )
     flip: BoolProperty(name="Flip", **orienting.ORIENT["flip"].keywords)
+    shift = 0.0  # of positions in columns of a file
 
     def plan(self, context, obj):
         reading = read_points(context, obj)
         method, flip = self.method, self.flip
-        viewpoint = self.viewpoints(context, obj, reading)
+        viewpoint, notices = self.viewpoints(context, obj, reading)
 
         def orient(measured, progress):
             laplacian, normals, areas = measured.built.laplacian, measured.measures[NORMAL], measured.measures[AREA]
@@ -69,16 +72,22 @@ class OrientNormals(Tool):
 
             return orienting.outward(reading.points, normals, areas, method, viewpoint, flip, keep)
 
-        return plan_analysis(context, obj, orient=orient)
+        analyze = plan_analysis(context, obj, orient=orient)
+
+        def compute(progress):
+            result = analyze(progress)
+            return replace(result, notices=[*notices, *result.notices])
+
+        return compute
 
     def viewpoints(self, context, obj, reading):
-        """Return the positions from which points, as read, were seen, (3,) or (n, 3); None if the method has none."""
+        """Return the positions from which points, as read, were seen, (3,) or (n, 3), or None, and notices of them."""
         if self.method == "VIEWPOINT":
-            return _place(context, obj, self.viewpoint)
+            return _place(context, obj, self.viewpoint), []
         if self.method != "ATTRIBUTE":
-            return None
-        vectors = _vectors(obj, self.source) @ reading.matrix.T
-        return vectors + reading.points if self.holds == "DIRECTIONS" else vectors
+            return None, []
+        vectors = _vectors(obj, self.source) @ reading.matrix.T - (self.shift if self.holds == "POSITIONS" else 0.0)
+        return orienting.seen_from(vectors, reading.points, self.holds, self.source, obj.name)
 
     def write(self, context, obj, result):
         before = obj.data.attributes.get(NORMAL)

@@ -131,10 +131,18 @@ def test_what_cannot_be_is_refused_and_nothing_changes(obj, settings, text):
         bpy.ops.meshfree.orient_normals(**settings)
 
 
-def test_vectors_that_are_no_numbers_are_refused(obj):
-    points = local_points(obj)
-    points[3] = np.nan
+@pytest.mark.parametrize(("holds", "factor"), [("POSITIONS", 1.5), ("DIRECTIONS", 1.0)])
+def test_points_without_a_vector_take_the_side_of_the_others(obj, capfd, holds, factor):
+    points = factor * local_points(obj)
+    points[3:20] = np.nan
     add_vectors(obj, points)
-    with pytest.raises(RuntimeError, match="not finite"):
+    assert bpy.ops.meshfree.orient_normals(method="ATTRIBUTE", source="seen", holds=holds) == {"FINISHED"}
+    assert outwards(obj).all()
+    assert f'17 of {len(points):,} points have no "seen" (NaN)' in capfd.readouterr().out
+
+
+def test_vectors_that_are_no_numbers_are_refused(obj):
+    add_vectors(obj, np.full_like(local_points(obj), np.nan))
+    with pytest.raises(RuntimeError, match="is NaN at all"):
         bpy.ops.meshfree.orient_normals(method="ATTRIBUTE", source="seen")
     assert "lb_orientation" not in obj.data.attributes

@@ -229,6 +229,18 @@ class TestOrient:
         )
         assert code == 0, line
         assert_array_equal(np.load(tmp_path / "a.npz")["normal"][:, 2] > 0.0, left)
+        up = np.where(left, 1.0, -1.0)[:, None] * [0.0, 0.0, 1.0]
+        some = np.random.default_rng(0).random(len(SQUARE)) < 0.1
+        for holds, vectors in (("positions", seen), ("directions", up)):
+            source = write(tmp_path / "a.ply", apart, given=np.where(some[:, None], vectors, np.nan))
+            options = "--source", "given", "--holds", holds, "--out", tmp_path / "a.npz"
+            code, [line] = run("orient", source, *options)
+            assert code == 0, line
+            assert_array_equal(np.load(tmp_path / "a.npz")["normal"][:, 2] > 0.0, left)
+            told = f'a.ply: {np.count_nonzero(~some)} of {len(some)} points have no "given" (NaN).'
+            assert any(notice.startswith(told) for notice in line["notices"])
+        code, [line] = run("orient", write(tmp_path / "b.ply", SQUARE, none=np.nan * SQUARE), "--source", "none")
+        assert (code, "is NaN at all 400 points" in line["error"]) == (1, True)
         code, [line] = run("orient", write(tmp_path / "b.ply", SQUARE, flat=SQUARE[:, 0]), "--source", "flat")
         assert (code, "holds no vectors" in line["error"]) == (1, True)
 
