@@ -99,6 +99,11 @@ def _read_header(file: IO[bytes], path: Path, size: int) -> tuple[np.dtype[Any],
         )
         if match
     ]
+    if start.startswith(_MAGIC) and re.search(r"['\"]descr['\"]\s*:\s*\[", header):
+        raise InvalidPointsError(
+            f"{path} holds records of named numbers, not an array (n, 3). Save x, y and z as one, or all as columns of"
+            " text (.csv) or .ply."
+        )
     if not start.startswith(_MAGIC) or len(found) < len(_FIELDS):
         raise InvalidPointsError(f"{path} holds no array of points. Save it again with numpy.")
     kind, columnwise, shape = (match[1] for match in found)

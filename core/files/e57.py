@@ -22,6 +22,7 @@ from .table import NORMAL, PointTable, full_color, unit_colors
 _HEAD = "<8sI12xQQQ"  # magic, version, offset and length of the description, size of a page
 _LONGEST = 32_000_000  # bytes of a description; that of a thousand scans has some millions
 
+_SMALLEST = 100.0  # extent of scans in millimeters, in these
 _LEAST, _GREATEST = -(2**63), 2**63 - 1  # whole numbers
 _CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
 _SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
@@ -86,7 +87,7 @@ def e57_scans(path: Path, notices: list[str]) -> Iterator[PointTable]:
             if len(scans) > 1:
                 table.attributes["scan"] = np.full(len(table.points), index, np.int32)
             yield table
-    if whole and extent:
+    if whole and extent > _SMALLEST:
         notices.append(
             f"{path.name}: all coordinates are whole numbers, up to {extent:,.0f} apart, which E57 counts in meters. If"
             " they are millimeters, scale the points by 0.001."

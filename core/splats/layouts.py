@@ -20,7 +20,7 @@ _UNUSED = (
     ),
     (
         "its splats are bound to triangles",
-        ("binding_",),
+        ("binding", "face_id", "face_index", "triangle"),
         "as those of GaussianAvatars, with places, sizes and rotations relative to these, which the file does not hold:"
         " they are shown as they are stored. Export one pose by the program that trained them.",
     ),

@@ -242,11 +242,13 @@ class TestArrays:
         np.savez(tmp_path / "a.npz", areas=np.ones(200))
         (tmp_path / "b.npy").write_text("no array")
         (tmp_path / "b.npz").write_text("no arrays")
+        np.save(tmp_path / "c.npy", np.zeros(9, [("x", "f4"), ("y", "f4"), ("z", "f4")]))
         for name, text in (
             ("a.npy", "shape"),
             ("a.npz", "points is not"),
             ("b.npy", "no array"),
             ("b.npz", "no array"),
+            ("c.npy", "records of named numbers"),
         ):
             with pytest.raises(PointCloudError, match=text):
                 read_points(tmp_path / name)

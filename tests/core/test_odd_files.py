@@ -320,6 +320,12 @@ def test_e57_of_whole_numbers_may_be_in_millimeters(tmp_path, kind):
         assert len(table.notices) == told
 
 
+def test_e57_of_a_few_meters_is_no_scan_in_millimeters(tmp_path):
+    fields = e57_files.points(np.arange(30).reshape(-1, 3))
+    (tmp_path / "a.e57").write_bytes(e57_files.seal(e57_files.make_e57((fields, 10, ""))))
+    assert both_ways(tmp_path / "a.e57").notices == []
+
+
 @pytest.mark.parametrize("scanned", [False, True])
 @pytest.mark.parametrize("start", [0, 3])
 def test_normals_in_pts(tmp_path, scanned, start):
