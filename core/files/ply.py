@@ -171,7 +171,7 @@ def _rest_notices(
     if lists < len(after) and left > 0:  # whose end only a look at all of them would tell
         name, code = after[lists].names[0], after[lists].types[0]
         corners = first_list(file, end, order, code) if name in _CORNERS and isinstance(code, tuple) else np.zeros(1)
-        if not (len(corners) and ((corners >= 0) & (corners < vertex.count)).all()):
+        if not (len(corners) and ((corners >= -1) & (corners < vertex.count)).all()):  # -1 ends a strip of triangles
             raise InvalidPointsError(
                 f"{path}: its first face has corners that are no points, so each point is longer than the {told} bytes"
                 " that its header names, and their places would be wrong. Export it again, as text, if possible."

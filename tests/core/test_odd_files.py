@@ -109,6 +109,19 @@ class TestPly:
         (tmp_path / "a.ply").write_bytes(head + rows["place"].tobytes() + corners)
         assert_array_equal(both_ways(tmp_path / "a.ply").points, rows["place"])
 
+    def test_strips_of_triangles(self, tmp_path):
+        """As VripPack writes them, each ending in -1."""
+        head = self.make(
+            "binary_big_endian",
+            [f"float {axis}" for axis in "xyz"],
+            "element tristrips 1",
+            "property list int int vertex_indices",
+            count=300,
+        )
+        strips = np.array([9, 0, 1, 2, 3, -1, 4, 5, 299, -1], ">i4")
+        (tmp_path / "a.ply").write_bytes(head + POINTS[:300].astype(">f4").tobytes() + strips.tobytes())
+        assert_allclose(both_ways(tmp_path / "a.ply").points, POINTS[:300], atol=1e-6)
+
     @pytest.mark.parametrize("kind", ["ascii", "binary_little_endian"])
     def test_more_points_than_the_header_names_are_told(self, tmp_path, kind):
         rows = POINTS[:300].astype("<f4")
