@@ -75,8 +75,9 @@ class Pairs:
 
         total = np.zeros((count, len(self.points)))
         for patch, (first, second) in zip(self.patches, on_all_cores(sums, self.patches, report), strict=True):
-            total[:, patch.rows] += first
-            total[:, patch.columns] += second
+            for row, own, other in zip(total, first, second, strict=True):  # two axes at once take thrice as long
+                row[patch.rows] += own
+                row[patch.columns] += other
         return total
 
     @functools.cached_property

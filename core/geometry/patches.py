@@ -37,11 +37,11 @@ class Patch:
 
     def first(self, values: Array) -> Array:
         """Return quantities of points, (..., m), at the first point of each pair, (..., pairs)."""
-        return np.repeat(values[..., self.rows], self.counts, axis=-1)
+        return np.repeat(_taken(values, self.rows), self.counts, axis=-1)
 
     def second(self, values: Array) -> Array:
         """Return quantities of points, (..., m), at the second point of each pair, (..., pairs)."""
-        return np.take(values[..., self.columns], self.ends.indices, axis=-1)
+        return _taken(_taken(values, self.columns), self.ends.indices)
 
     def mean(self, values: Floats) -> Floats:
         """Return the mean of a point quantity over both ends of each pair."""
@@ -59,6 +59,11 @@ class Patch:
             total[:] = self.ends @ ones
         self.ends.data = none
         return result
+
+
+def _taken(values: Array, places: Ints) -> Array:
+    """Return entries of the last axis at places that are all in range: to check that takes a third of the time."""
+    return np.take(values, places, axis=-1, mode="clip")
 
 
 def divide_pairs(start: Ints, second: Ints) -> list[Patch]:

@@ -86,19 +86,22 @@ def balance_weights(
     slowest = _FASTEST / (1.0 + 0.25 * _ROUNDS**2)  # what so many rounds reduce to 1 / cosh(4)
     rates = chebyshev_steps(slowest, _FASTEST)
     for number in range(_ROUNDS + 1):
-        missing = goal - moments.of(terms)
+        if number < 2:  # from the kernel's weights to nearly the end in the first round, half a step
+            found, curvature = moments.with_curvature(terms)
+            inverse = inverses(0.5 * curvature + MET * np.eye(TERMS))
+        else:
+            found = moments.of(terms)
+        missing = goal - found
         residual = np.linalg.norm(missing, axis=1)
         met = residual < _SMALLEST
         if number == _ROUNDS or met.all():
             break
-        if number < 2:  # from the kernel's weights to nearly the end in the first round, half a step
-            inverse = inverses(0.5 * moments.curvature(terms) + MET * np.eye(TERMS))
         kept, rate = next(rates) if number else (0.0, 0.5)
         step = kept * step + rate * np.einsum("iab,ib->ia", inverse, missing - MET * terms)
         step /= np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1.0)
         step[met] = 0.0
         terms += step
-    return Balance(moments.factor(terms), residual)
+    return Balance(moments.factor, residual)
 
 
 def _trace(cloud: Cloud, weights: Floats, areas: Floats) -> Floats:
@@ -118,11 +121,18 @@ def _trace(cloud: Cloud, weights: Floats, areas: Floats) -> Floats:
 
 
 class _Moments:
-    """The moments of weights around every point, in units of those of the kernel."""
+    """The moments of weights around every point, in units of those of the kernel.
+
+    Attributes
+    ----------
+    factor : ndarray, (p,)
+        By which each pair's weight was multiplied last.
+    """
 
     def __init__(self, cloud: Cloud, distance: Floats, weights: Floats, unit: Floats, report: Report) -> None:
         pairs, lengths = cloud.pairs, cloud.pairs.lengths
         self._pairs, self._weights, self._unit, self._report = pairs, weights, unit, report
+        self.factor = np.empty(len(weights))
         # The offsets from both ends, in the tangent planes there over h; next to boundaries, the terms of some pairs.
         self._offsets = np.empty((2, 2, len(weights)), dtype=np.float32)  # seven digits, of numbers about one
         places, normals = pairs.points.T.copy(), cloud.normals.T.copy()
@@ -149,40 +159,35 @@ class _Moments:
         at_edges = on_all_cores(describe, pairs.patches, report)
         self._at_edges = {patch.pairs.start: found for patch, found in zip(pairs.patches, at_edges, strict=True)}
 
-    def factor(self, terms: Floats) -> Floats:
-        """Return the factor of each pair's weight, (p,)."""
-        terms, result = terms.T.copy(), np.empty(len(self._weights))
-
-        def evaluate(patch: Patch) -> None:
-            result[patch.pairs] = _factor(patch, self._basis(patch), terms)
-
-        on_all_cores(evaluate, self._pairs.patches, self._report)
-        return result
-
     def of(self, terms: Floats) -> Floats:
-        """Return the moments of the weights times that factor, (m, 5); those of the kernel are (1, 0, 0, 0, 0)."""
+        """Return the moments of the weights times their factors, (m, 5); those of the kernel are (1, 0, 0, 0, 0).
+
+        The factors are those of polynomials with these coefficients, (m, 5), and kept.
+        """
         terms = terms.T.copy()
 
         def weighted(patch: Patch) -> Floats:
             basis = self._basis(patch)
-            basis *= self._weights[patch.pairs] * _factor(patch, basis, terms)
+            basis *= self._weigh(patch, basis, terms)
             return basis
 
         return self._sums(weighted, TERMS)
 
-    def curvature(self, terms: Floats) -> Floats:
-        """Return the second derivatives of the entropy for the terms of each point alone, (m, 5, 5)."""
+    def with_curvature(self, terms: Floats) -> tuple[Floats, Floats]:
+        """Return them, and the second derivatives of the entropy for the coefficients of each point, (m, 5, 5)."""
         places, terms = [(i, j) for i in range(TERMS) for j in range(i + 1)], terms.T.copy()
 
         def products(patch: Patch) -> list[list[Floats]]:
             basis = self._basis(patch)
-            weighted = self._weights[patch.pairs] * _factor(patch, basis, terms) * basis
-            return [[own[i] * other[j] for i, j in places] for own, other in zip(weighted, basis, strict=True)]
+            weighted = self._weigh(patch, basis, terms) * basis
+            ends = zip(weighted, basis, strict=True)
+            return [[*own, *(own[i] * other[j] for i, j in places)] for own, other in ends]
 
         left, right = np.transpose(places)
-        result = np.empty((len(self._unit), TERMS, TERMS))
-        result[:, left, right] = result[:, right, left] = self._sums(products, len(places))
-        return result
+        sums = self._sums(products, TERMS + len(places))
+        curvature = np.empty((len(sums), TERMS, TERMS))
+        curvature[:, left, right] = curvature[:, right, left] = sums[:, TERMS:]
+        return sums[:, :TERMS], curvature
 
     def _sums(self, values: Callable[[Patch], Any], count: int) -> Floats:
         """Return the sums of quantities of pairs at both ends, in the unit, (m, count)."""
@@ -197,9 +202,10 @@ class _Moments:
             basis[:, rows] = terms
         return result
 
-
-def _factor(patch: Patch, basis: Floats, terms: Floats) -> Floats:
-    """Return the factor of the weights of a patch, from the terms of its pairs and their coefficients, (5, m)."""
-    power = np.einsum("tp,tp->p", basis[0], patch.first(terms))
-    power += np.einsum("tp,tp->p", basis[1], patch.second(terms))
-    return np.exp(np.clip(0.5 * power, -LARGEST, LARGEST))
+    def _weigh(self, patch: Patch, basis: Floats, terms: Floats) -> Floats:
+        """Return the weights of a patch times their factors, by the terms of its pairs and coefficients, (5, m)."""
+        power = np.einsum("tp,tp->p", basis[0], patch.first(terms))
+        power += np.einsum("tp,tp->p", basis[1], patch.second(terms))
+        power *= 0.5
+        factor = np.exp(np.clip(power, -LARGEST, LARGEST), out=self.factor[patch.pairs])
+        return self._weights[patch.pairs] * factor
