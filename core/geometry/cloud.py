@@ -262,7 +262,8 @@ def measure_surface(
         cells = cells_within(edge, cells)
     report("Neighbors", 0.25)
     lengths = smoothing_lengths(nearest, oriented, quadrics, cells, edge, options, sample.component, decisions)
-    pairs = Pairs(nearest.points, lengths, *find_pairs(nearest.tree, lengths, lambda: report("Neighbors", 0.3)))
+    first_and_second = find_pairs(nearest.tree, lengths, lambda: report("Neighbors", 0.3), nearest)
+    pairs = Pairs(nearest.points, lengths, *first_and_second)
     parted = edge.parting(nearest.tree, sides.normals, pairs.first, pairs.second, gaps)
     if len(parted):
         joined = np.ones(len(pairs.first), dtype=bool)

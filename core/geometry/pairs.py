@@ -13,6 +13,7 @@ from ..algebra import on_all_cores
 from ..cores import cores
 from ..kernel import SUPPORT
 from ..types import Array, Bools, Floats, Ints, Report
+from .nearest import COUNT, Nearest
 from .patches import Patch, divide_pairs
 
 Ends: TypeAlias = Sequence[Sequence[Floats]] | Floats  # quantities of pairs at their first and second points
@@ -93,7 +94,9 @@ class Pairs:
         return start
 
 
-def find_pairs(tree: cKDTree, lengths: Floats, report: Report = lambda: None) -> list[Array]:
+def find_pairs(
+    tree: cKDTree, lengths: Floats, report: Report = lambda: None, nearest: Nearest | None = None
+) -> list[Array]:
     """Find all pairs nearer than 3 h_ij, with h_ij = (h_i + h_j) / 2.
 
     Parameters
@@ -104,6 +107,8 @@ def find_pairs(tree: cKDTree, lengths: Floats, report: Report = lambda: None) ->
         Smoothing lengths.
     report : callable
         Called before each block of points; may raise `Cancelled`.
+    nearest : Nearest, optional
+        Of the points: where these reach further than the kernel, no others are searched for.
 
     Returns
     -------
@@ -112,27 +117,38 @@ def find_pairs(tree: cKDTree, lengths: Floats, report: Report = lambda: None) ->
     distance : ndarray, (pairs,)
     """
     radii = SUPPORT * lengths
+    many, found = np.zeros(tree.n, dtype=np.int64), []
+
+    def keep(rows: Ints, distance: Floats, column: Ints) -> None:
+        reach, other = radii[rows, None], radii[column]
+        # A pair is kept by the end that reaches further, which always sees it.
+        kept = (reach > other) | ((reach == other) & (rows[:, None] < column))
+        kept &= distance <= 0.5 * (reach + other)
+        many[rows] = np.count_nonzero(kept, axis=1)
+        found.append((rows, column[kept].astype(np.int32), distance[kept]))
+
+    open_ = np.arange(tree.n)
+    if nearest is not None:
+        known = (radii < nearest.distance[:, -1]) & ~nearest.in_row
+        open_ = np.flatnonzero(~known)
+        for rows in np.array_split(np.flatnonzero(known), tree.n * COUNT // _BLOCK + 1):
+            report()
+            keep(rows, nearest.distance[rows], nearest.index[rows])
     # Counted first, which takes little, so that none is searched for in vain: points with as many are asked together.
-    count = tree.query_ball_point(tree.data, radii, workers=cores(), return_length=True)
+    count = tree.query_ball_point(tree.data[open_], radii[open_], workers=cores(), return_length=True)
     group = np.ceil(np.log2(count) * _GROUPS).astype(np.int16)
     order = np.argsort(group, kind="stable")
-    many, found = np.zeros(tree.n, dtype=np.int64), []
-    for members in np.split(order, np.flatnonzero(np.diff(group[order])) + 1):
+    groups = np.split(order, np.flatnonzero(np.diff(group[order])) + 1) if len(order) else []
+    for members in groups:
         most = int(count[members].max())
-        for rows in np.array_split(members, len(members) * most // _BLOCK + 1):
+        for rows in np.array_split(open_[members], len(members) * most // _BLOCK + 1):
             report()
-            distance, column = tree.query(tree.data[rows], k=np.arange(1, most + 1), workers=cores())
-            reach, other = radii[rows, None], radii[column]
-            # A pair is kept by the end that reaches further, which always sees it.
-            kept = (reach > other) | ((reach == other) & (rows[:, None] < column))
-            kept &= distance <= 0.5 * (reach + other)
-            many[rows] = np.count_nonzero(kept, axis=1)
-            found.append((rows, column[kept].astype(np.int32), distance[kept]))
+            keep(rows, *tree.query(tree.data[rows], k=np.arange(1, most + 1), workers=cores()))
     start = np.cumsum(many) - many
     first = np.repeat(np.arange(tree.n, dtype=np.int32), many)
     second, distance = np.empty(len(first), dtype=np.int32), np.empty(len(first))
     while found:
-        rows, column, length = found.pop()
-        place = np.arange(len(column)) + np.repeat(start[rows] - np.cumsum(many[rows]) + many[rows], many[rows])
+        owner, column, length = found.pop()
+        place = np.arange(len(column)) + np.repeat(start[owner] - np.cumsum(many[owner]) + many[owner], many[owner])
         second[place], distance[place] = column, length
     return [first, second, distance]
