@@ -173,8 +173,11 @@ def _merge(points: Floats) -> tuple[Floats, Ints, Ints]:
     inverse : ndarray, (n,) int
         The place of each point.
     """
-    distinct, first, inverse = np.unique(points, axis=0, return_index=True, return_inverse=True)
-    inverse = inverse.reshape(-1)
+    order = np.lexsort(points.T[::-1])
+    ordered = points[order]
+    new = np.append(True, (ordered[1:] != ordered[:-1]).any(axis=1))
+    distinct, first, inverse = ordered[new], order[new], np.empty_like(order)
+    inverse[order] = np.cumsum(new) - 1
     while len(distinct) > 1:
         distance, near = cKDTree(distinct).query(distinct, k=2, distance_upper_bound=_SAME, workers=cores())
         close = np.flatnonzero(np.isfinite(distance[:, 1]))

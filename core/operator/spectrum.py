@@ -150,10 +150,12 @@ def symmetric_form(
     order = known[cKDTree(laplacian.points[known]).indices]
     root = 1.0 / np.sqrt(laplacian.areas[order])
     report()
+    place = np.zeros(stiffness.shape[0], dtype=stiffness.indices.dtype)
+    place[order] = np.arange(len(order))
     matrix = stiffness[order]
+    rows = sparse.csr_array((matrix.data, place[matrix.indices], matrix.indptr), shape=(len(order),) * 2)
     report()
-    matrix = matrix[:, order]
-    matrix.sort_indices()  # and so the sums of products
+    matrix = rows.T.tocsr()  # the same, as it is symmetric; transposing sorts the columns, and so the sums of products
     report()
     matrix.data *= np.repeat(root, np.diff(matrix.indptr)) * root[matrix.indices]
     return order, root, matrix
