@@ -15,7 +15,7 @@ from .distances import arc_squared
 from .nearest import AGREEING, COUNT, FEW, GAP, NEXT, ON, POWER, SMOOTH, Nearest, fading_weights
 from .noise import LEFT
 from .points import FEWEST
-from .quadrics import frames
+from .quadrics import chords, eighths, frames, in_plane
 from .sheets import on_sheet
 
 _BLOCK = 1 << 13  # points looked at at one time
@@ -141,15 +141,17 @@ def find_boundary(nearest: Nearest, oriented: Floats, gaps: Floats) -> Bools:
 
     def facing_a_gap(part: slice) -> Ints:
         block = np.arange(part.start, part.stop)
-        offset = points[nearest.index[block]] - points[block, None]
-        flat = offset @ frames(oriented[block])[:, :, 1:]
-        known = nearest.weight[block, 1:] > 0.0
-        angle = np.sort(np.where(known, np.arctan2(flat[:, 1:, 1], flat[:, 1:, 0]), np.nan), axis=1)
+        flat = in_plane(chords(points, block, nearest.index[block]), oriented[block])
+        known = nearest.weight[block] > 0.0
+        known[:, 0] = False
+        open_ = np.flatnonzero(~_surrounded(flat, known))
+        flat, known = flat[:, open_], known[open_, 1:]
+        angle = np.sort(np.where(known, np.arctan2(flat[1, :, 1:], flat[0, :, 1:]), np.nan), axis=1)
         around = np.concatenate([angle, angle[:, :1] + 2.0 * np.pi], axis=1)
         gap = np.fmax.reduce(np.diff(around, axis=1), axis=1)
         # Neighbours left out sort last, as NaN: the gap over the end is counted from the last known angle.
         gap = np.fmax(gap, angle[:, 0] + 2.0 * np.pi - np.fmax.reduce(angle, axis=1))
-        return block[gap > _ANGLE]
+        return block[open_[gap > _ANGLE]]
 
     rows = np.concatenate(on_all_cores(facing_a_gap, blocks(len(points), _BLOCK)))
     if not len(rows):
@@ -166,6 +168,15 @@ def find_boundary(nearest: Nearest, oriented: Floats, gaps: Floats) -> Bools:
     length = np.bincount(label, nearest.spacing[rows] / gaps[rows])
     result[rows] = length[label] >= 2.0 * np.pi * HOLE
     return result
+
+
+def _surrounded(flat: Floats, known: Bools) -> Bools:
+    """Tell around which points known ones, (k, views), lie in each eighth of the plane, seen from there, (2, k, views).
+
+    Between them is no gap as wide as `_ANGLE`, which holds an eighth wherever it begins.
+    """
+    seen = np.bitwise_or.reduce(known << eighths(*flat), axis=1)
+    return seen == (1 << NEXT) - 1
 
 
 def _bends_away(nearest: Nearest, oriented: Floats, rows: Ints) -> Bools:

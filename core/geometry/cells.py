@@ -10,9 +10,9 @@ import numpy as np
 from ..algebra import blocks, on_all_cores
 from ..cores import cores
 from ..types import Bools, Floats, Ints, Report
-from .distances import arc_ahead, arc_squared, bent_ways
+from .distances import arc_ahead, arc_squared, bent_ways, heights_of_ends
 from .nearest import COUNT, Nearest
-from .quadrics import CURVED, frames
+from .quadrics import CURVED, along, chords, frames, gathered
 from .sheets import on_sheet
 
 if TYPE_CHECKING:
@@ -143,27 +143,28 @@ def _cuts(
         counted &= joined
     index, distance, counted, joined = index[:, 1:], distance[:, 1:], counted[:, 1:], joined[:, 1:]
     around = normals if sides is None else sides.around
-    side = np.where(np.einsum("ikc,ic->ik", around[index], around[rows]) < 0.0, -1.0, 1.0)
-    here, there = normals[rows], side[:, :, None] * normals[index]
-    frame = frames(here)[:, :, 1:]
-    chord = nearest.points[index] - nearest.points[rows, None]
-    cosine = np.einsum("ikc,ic->ik", there, here)
-    left, right = np.einsum("ikc,ic->ik", chord, here), np.einsum("ikc,ikc->ik", chord, there)
+    chord, frame = chords(nearest.points, rows, index), frames(normals[rows])[:, :, 1:]
+    side = np.where(heights_of_ends(chord, around, rows, index)[0] < 0.0, -1.0, 1.0)
+    cosine, left, right = heights_of_ends(chord, normals, rows, index)
+    cosine, right = side * cosine, side * right
     squared, ahead = arc_squared(distance**2, left, right, cosine), arc_ahead(left, right)
     if sides is not None:
         sure = np.maximum(sides.sharp[rows, None], sides.sharp[index])
         edged = np.nonzero(sure)
-        turn = sides.turn(rows[edged[0]], index[edged], chord[edged], side[edged])
+        turn = sides.turn(rows[edged[0]], index[edged], chord[:, edged[0], edged[1]].T, side[edged])
         heights = left[edged], right[edged], cosine[edged]
         squared[edged], ahead[edged] = bent_ways(distance[edged] ** 2, *heights, turn, sure[edged])
-    step = (chord + ahead[:, :, None] * there) @ frame
+    for step, normal in zip(chord, normals.T, strict=True):
+        step += side * ahead * gathered(normal, index)
+    step = np.stack([along(chord, axis) for axis in frame.transpose(2, 1, 0)])
     length = 0.5 * np.sqrt(squared) * (1.0 + np.clip(gaussian_curvature[rows, None] * squared / 12.0, -CURVED, CURVED))
     length = np.maximum(length, _CLOSEST * nearest.spacing[rows, None])
-    cuts = step * (counted / (np.maximum(np.linalg.norm(step, axis=2), 1e-300) * length))[:, :, None]
+    cuts = step * (counted / (np.maximum(np.hypot(*step), 1e-300) * length))
     inside = np.maximum(boundary.distance[rows], _AT_BOUNDARY * nearest.spacing[rows, None])
     outward = np.einsum("iac,ick->iak", boundary.outward[rows], frame) / inside[:, :, None]
+    cuts = np.concatenate([np.moveaxis(cuts, 0, 2), outward], axis=1)
     # Of a small component all points are seen, and nothing is known of what lies further away than they do.
-    return np.concatenate([cuts, outward], axis=1), np.sqrt(np.max(squared, axis=1, where=joined, initial=0.0))
+    return cuts, np.sqrt(np.max(squared, axis=1, where=joined, initial=0.0))
 
 
 def _caps(cuts: Floats, size: Floats) -> Floats:

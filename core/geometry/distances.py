@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..algebra import on_all_cores
-from ..types import Floats
+from ..types import Floats, Ints
 from .nearest import AGREEING, NEXT, SMOOTH, Nearest
 from .patches import Patch
+from .quadrics import chords, gathered
 
 if TYPE_CHECKING:
     from .cloud import Cloud
@@ -143,14 +144,37 @@ def measure_squared_slope(nearest: Nearest, normals: Floats) -> Floats:
     """
     near = slice(1, NEXT + 1)
     index, counted = nearest.index[:, near], nearest.weight[:, near] > 0.0
-    chord = nearest.points[index] - nearest.points[:, None]
-    cosine = np.einsum("ikc,ic->ik", normals[index], normals)
-    side = np.where(cosine < 0.0, -1.0, 1.0)
-    height = np.einsum("ikc,ic->ik", chord, normals) + side * np.einsum("ikc,ikc->ik", chord, normals[index])
+    rows = np.arange(len(index))
+    cosine, left, right = heights_of_ends(chords(nearest.points, rows, index), normals, rows, index)
+    height = left + np.where(cosine < 0.0, -right, right)
     across = counted & (np.abs(cosine) < SMOOTH)
     smooth = counted & ~across & (across.sum(axis=1) < AGREEING)[:, None]
     slope = np.where(smooth, (0.5 * height / nearest.distance[:, near]) ** 2, 0.0)
     return nearest.averaging() @ (slope.sum(axis=1) / np.maximum(counted.sum(axis=1), 1))
+
+
+def heights_of_ends(chord: Floats, normals: Floats, rows: Ints, other: Ints) -> tuple[Floats, Floats, Floats]:
+    """Return of chords from some points, (k,) int, to others, (k, views) int, what `pair_heights` does of pairs.
+
+    Parameters
+    ----------
+    chord : ndarray, (3, k, views)
+        Of `chords`.
+    normals : ndarray, (m, 3)
+    rows, other : ndarray of int
+
+    Returns
+    -------
+    cosine, left, right : ndarray, (k, views)
+        Cosines of the normals of both ends, and the heights of the chords along the first and along the second.
+    """
+    cosine, left, right = np.zeros((3, *other.shape))
+    for step, normal in zip(chord, normals.T, strict=True):
+        here, there = normal[rows, None], gathered(normal, other)
+        cosine += there * here
+        left += step * here
+        right += step * there
+    return cosine, left, right
 
 
 def pair_heights(

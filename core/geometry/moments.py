@@ -10,7 +10,7 @@ from ..algebra import blocks, eliminate, on_all_cores
 from ..kernel import SUPPORT, pair_kernel
 from ..types import Floats, Ints
 from .nearest import COUNT, Nearest
-from .quadrics import frames
+from .quadrics import along, chords, frames, gathered
 from .sheets import on_sheet
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ _MORE = 64, 160  # neighbours looked at where the kernel holds more than 40; bey
 LARGEST = 2.0  # change of the logarithm of a weight: where more is needed the moments cannot be met
 _STEPS = 8  # of Newton's method
 MET = 2e-3  # relative error of the moments that is small enough, for a kernel, and for a ridge under the terms
-_BLOCK = 1 << 11
+_BLOCK = 1 << 12
 
 
 class EdgeTerms:
@@ -107,11 +107,11 @@ def least_error(
         lengths_here = lengths[rows, None]
         within = slice(np.count_nonzero(distance < SUPPORT * lengths_here, axis=1).max())
         distance, index = distance[:, within], index[:, within]
-        density, folded = areas[index], np.flatnonzero(nearest.apart[rows].any(axis=1))
+        density, folded = gathered(areas, index), np.flatnonzero(nearest.apart[rows].any(axis=1))
         density[folded] *= on_sheet(nearest, normals, rows[folded], index[folded], distance[folded])[0]
         distance = distance / lengths_here
-        chord = nearest.points[index] - nearest.points[rows, None]
-        x, y = (np.einsum("ikc,ci->ik", chord, axis[:, rows]) for axis in tangents)
+        chord = chords(nearest.points, rows, index)
+        x, y = (along(chord, axis[:, rows]) for axis in tangents)
         size = distance / np.maximum(np.hypot(x, y), 1e-300)
         terms = np.empty((TERMS, *x.shape))
         put_terms(x * size, y * size, terms)

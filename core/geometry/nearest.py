@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from ..cores import cores
 from ..types import Bools, Floats, Ints
-from .quadrics import Quadrics, fit_quadrics, roundness
+from .quadrics import Quadrics, chords, covariance, fit_quadrics, roundness
 
 COUNT = 41  # the point itself and 40 others, so that a component has an operator if its neighbourhoods lie within it
 NEXT = 8  # nearest of them: as many as there are directions in which a sheet or a row goes on
@@ -86,9 +86,9 @@ class Nearest:
 
     def along_row(self, rows: Ints) -> Bools:
         """Tell of which of some points, (k,) int, the nearest eight neighbours lie along a row, (k,) bool."""
-        offset = self.points[self.index[rows, : NEXT + 1]]
-        offset = offset - offset.mean(axis=1, keepdims=True)
-        lined: Bools = roundness(np.linalg.eigvalsh(np.swapaxes(offset, 1, 2) @ offset)) < ROW
+        index = self.index[rows, : NEXT + 1]
+        even = np.full(index.shape, 1.0 / index.shape[1])
+        lined: Bools = roundness(np.linalg.eigvalsh(covariance(chords(self.points, rows, index), even))) < ROW
         return lined
 
     @functools.cached_property
@@ -163,7 +163,10 @@ def fading_weights(distance: Floats) -> Floats:
     Which of several neighbours at the same last distance was found then makes no difference. Only where nearly all of
     them are that far, such as around the pole of circles of latitude, all count alike.
     """
-    weights = (1.0 - (distance / distance[:, -1:]) ** 2) ** 2
+    weights = distance / distance[:, -1:]
+    weights *= weights
+    np.subtract(1.0, weights, out=weights)
+    weights *= weights
     tied = weights[:, 1:].sum(axis=1) < 1.0
     weights[tied] = 1.0
     return weights

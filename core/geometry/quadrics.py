@@ -6,7 +6,7 @@ import numpy as np
 
 from ..algebra import blocks, eliminate, on_all_cores
 from ..errors import NotASurfaceError
-from ..types import Floats, Ints
+from ..types import Array, Floats, Ints
 
 _BLOCK = 1 << 13  # points fitted at one time
 _CURVE = 5e-3  # roundness of neighbours on a curve
@@ -106,20 +106,16 @@ def fit_quadrics(
     )
 
     def fit_block(block: slice) -> None:
-        places, here = points[index[block]], points[rows[block]]
-        offset = [places[:, :, axis] - here[:, axis, None] for axis in range(3)]
+        offset = chords(points, rows[block], index[block])
         share = weight[block] / weight[block].sum(axis=1, keepdims=True)
-        covariance = _covariance(offset, share)
+        spread = covariance(offset, share)
         if normals is None:
-            variance, frame = np.linalg.eigh(covariance)
+            variance, frame = np.linalg.eigh(spread)
             fitted.roundness[block] = roundness(variance)
         else:
             frame = frames(normals[block])
-        unit = 3.0 * np.sqrt(0.5 * np.trace(covariance, axis1=1, axis2=2))  # makes the equations well scaled
-        z, v, u = (
-            sum(step * side[:, None] for step, side in zip(offset, axis.T / unit, strict=True))
-            for axis in np.moveaxis(frame, 2, 0)
-        )
+        unit = 3.0 * np.sqrt(0.5 * np.trace(spread, axis1=1, axis2=2))  # makes the equations well scaled
+        z, v, u = (along(offset, axis.T / unit) for axis in np.moveaxis(frame, 2, 0))
         basis = np.ones_like(u), u, v, u * u, u * v, v * v
         equations = np.empty((6, 7, len(u)))
         for row, weighted in enumerate(share * values for values in basis):
@@ -152,8 +148,8 @@ def fit_quadrics(
     return fitted
 
 
-def _covariance(offset: list[Floats], share: Floats) -> Floats:
-    """Return the covariance of offsets, three of (k, neighbors), whose shares sum to one, (k, 3, 3)."""
+def covariance(offset: Floats, share: Floats) -> Floats:
+    """Return the covariance of offsets, (3, k, neighbors), whose shares sum to one, (k, 3, 3)."""
     result = np.empty((len(share), 3, 3))
     centered = [step - _sums(share, step)[:, None] for step in offset]
     for row, weighted in enumerate(share * step for step in centered):
@@ -166,7 +162,7 @@ def _sums(left: Floats, right: Floats) -> Floats:
     return np.einsum("ik,ik->i", left, right)
 
 
-def roundness(variances: Floats) -> Floats:
+def roundness(variances: Array) -> Floats:
     """Return the second over the largest variance of neighbourhoods, (k,), by variances in ascending order, (k, 3)."""
     return variances[:, 1] / np.maximum(variances[:, 2], 1e-300)
 
@@ -213,6 +209,41 @@ def heights_over(quadrics: Quadrics, points: Floats, rows: Ints, other: Ints) ->
     square = 0.5 * (xx * x**2 + yy * y**2 + zz * z**2) + xy * x * y + xz * x * z + yz * y * z
     a, b, c = (quadrics.normals[:, axis][rows] for axis in range(3))
     return a * x + b * y + c * z + square
+
+
+def chords(points: Floats, rows: Ints, index: Ints) -> Floats:
+    """Return the chords from some of the points, (k,) int, to others, (k, views) int: (3, k, views).
+
+    One coordinate after the other, as arrays whose last axis is three long take several times as long.
+    """
+    result = np.empty((3, *index.shape))
+    for place, chord in zip(points.T, result, strict=True):
+        np.subtract(gathered(place, index), place[rows, None], out=chord)
+    return result
+
+
+def gathered(values: Array, index: Ints) -> Array:
+    """Return the values, (m,), of points, all in range: to check that takes longer than to take them."""
+    return np.take(values, index, mode="clip")
+
+
+def in_plane(chord: Floats, normals: Floats) -> Floats:
+    """Return the coordinates of chords, (3, k, views), in the tangent planes, by normals, (k, 3): (2, k, views)."""
+    tangents = frames(normals)[:, :, 1:].transpose(2, 1, 0)
+    return np.stack([along(chord, tangent) for tangent in tangents])
+
+
+def along(chord: Floats, directions: Floats) -> Floats:
+    """Return the components of chords, (3, k, views), along directions, (3, k): (k, views)."""
+    x, y, z = (step * part[:, None] for step, part in zip(chord, directions, strict=True))
+    x += y
+    x += z
+    return x
+
+
+def eighths(x: Floats, y: Floats) -> Ints:
+    """Return in which eighth of the plane places lie, from 0 to 7 in no order: quarters, halved by their diagonals."""
+    return (x > 0.0) * np.int16(4) + (y > 0.0) * np.int16(2) + (np.abs(x) > np.abs(y))
 
 
 def frames(normals: Floats) -> Floats:

@@ -14,11 +14,11 @@ from scipy.spatial import cKDTree
 from ..algebra import blocks, on_all_cores
 from ..types import Array, Bools, Floats, Ints
 from .components import label_connected, number_by_size
-from .distances import pair_heights
+from .distances import heights_of_ends, pair_heights
 from .nearest import COUNT, FEW, NEXT, ON, SMOOTH, Nearest
 from .pairs import Pairs
 from .patches import Patch
-from .quadrics import Quadrics, fit_quadrics, frames
+from .quadrics import Quadrics, chords, eighths, fit_quadrics, in_plane
 
 _LEANING = 0.1  # what normals may be off by, as a share of the distance
 _SEEDS = 9  # nearest neighbours, every two of which make such a plane
@@ -76,13 +76,7 @@ def on_sheet(
     cosine : ndarray, (k, views)
         Of the angle between the normals.
     """
-    cosine, left, right = np.zeros((3, *other.shape))
-    for place, normal in zip(nearest.points.T, normals.T, strict=True):
-        here, there = normal[rows, None], normal[other]
-        chord = place[other] - place[rows, None]
-        cosine += there * here
-        left += chord * here
-        right += chord * there
+    cosine, left, right = heights_of_ends(chords(nearest.points, rows, other), normals, rows, other)
     return same_sheet(left, right, cosine, distance, nearest.spacing[rows, None], close), cosine
 
 
@@ -238,21 +232,23 @@ def sheet_neighbors(nearest: Nearest, normals: Floats, oriented: bool) -> Bools:
     def find(part: slice) -> None:
         block = np.arange(part.start, part.stop)
         index = nearest.index[block]
-        flat = (nearest.points[index] - nearest.points[block, None]) @ frames(normals[block])[:, :, 1:]
-        angle = np.arctan2(flat[:, :, 1], flat[:, :, 0])
-        # Counted from the nearest neighbour, so that they turn with the points.
-        sector = np.round((angle - angle[:, 1:2]) * (0.5 * NEXT / np.pi)) % NEXT
+        x, y = in_plane(chords(nearest.points, block, index), normals[block])
+        # Counted from the nearest neighbour, so that they turn with the points: it lies in the middle of an eighth.
+        nearest_one = x[:, 1] + 1j * y[:, 1]
+        turn = np.where(nearest_one == 0.0, 1.0, nearest_one) * np.exp(-1j * np.pi / NEXT)
+        cosine, sine = turn.real[:, None], turn.imag[:, None]
+        eighth = eighths(cosine * x + sine * y, cosine * y - sine * x)
         same, cosine = on_sheet(nearest, normals, block, index, nearest.distance[block], close=1.0)
         # Across an edge only points that touch are next to each other, others may be so across a gap.
         same &= ((cosine if oriented else np.abs(cosine)) > SMOOTH) | (
             nearest.distance[block] < _AROUND * nearest.spacing[block, None]
         )
-        same[:, 0] = False
-        rows = np.arange(len(block))
-        for side in range(NEXT):
-            ahead = same & (sector == side)
-            first = ahead.argmax(axis=1)
-            result[block, first] |= ahead[rows, first]
+        eighth[~same] = NEXT
+        every, first = np.arange(len(block)), np.zeros((len(block), NEXT + 1), dtype=np.intp)
+        for place in reversed(range(1, index.shape[1])):
+            first[every, eighth[:, place]] = place  # the last assignment, of the nearest, stays
+        result[block[:, None], first[:, :NEXT]] = True
+        result[block, 0] = False  # the point itself
 
     on_all_cores(find, blocks(len(result), _BLOCK))
     return result
