@@ -23,7 +23,7 @@ from benchmarks.samplings import (
     uneven_sphere,
 )
 from core.geometry.bandwidth import mean_gaps
-from core.geometry.boundary import find_boundary, measure_boundary, no_boundary
+from core.geometry.boundary import _surrounded, find_boundary, measure_boundary, no_boundary
 from core.geometry.cells import measure_cells
 from core.geometry.cloud import read_cloud
 from core.geometry.distances import arc_length
@@ -360,3 +360,14 @@ class TestGiven:
     def test_too_few_points_of_a_boundary_are_refused(self):
         with pytest.raises(core.InvalidPointsError, match="given by 3 different points"):
             core.build_laplacian(square_grid(18), boundary=[0, 1, 2])
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3, 1.0])
+def test_points_in_all_eighths_leave_no_gap_of_90_degrees(turn):
+    angles = np.random.default_rng(2).uniform(0.0, 2.0 * np.pi, (4000, 14)) + turn
+    surrounded = _surrounded(np.array([np.cos(angles), np.sin(angles)]), np.ones(angles.shape, dtype=bool))
+    ordered = np.sort(angles % (2.0 * np.pi), axis=1)
+    gap = np.diff(ordered, axis=1, append=ordered[:, :1] + 2.0 * np.pi).max(axis=1)
+    assert surrounded.any()
+    assert gap[surrounded].max() < 0.5 * np.pi
+    assert surrounded[gap < 0.24 * np.pi].all()
