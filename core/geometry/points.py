@@ -195,7 +195,7 @@ def _merge(points: Floats) -> tuple[Floats, Ints, Ints]:
 
 
 def as_mask(chosen: ArrayLike, count: int) -> Bools:
-    """Return a set of points, (k,) indices or an (n,) bool mask, as a mask.
+    """Return a set of points, an index, (k,) indices or an (n,) bool mask, as a mask.
 
     Raises
     ------
@@ -208,7 +208,7 @@ def as_mask(chosen: ArrayLike, count: int) -> Bools:
     mask = np.zeros(count, dtype=bool)
     if given.size == 0:
         return mask
-    if given.ndim != 1 or given.dtype.kind not in "iu" or given.min() < -count or given.max() >= count:
+    if given.ndim > 1 or given.dtype.kind not in "iu" or given.min() < -count or given.max() >= count:
         raise InvalidPointsError(
             f"A set of points has the shape {given.shape} and type {given.dtype}. Give whole numbers below"
             f" {count}, or {count} truth values."
@@ -218,7 +218,7 @@ def as_mask(chosen: ArrayLike, count: int) -> Bools:
 
 
 def as_indices(chosen: ArrayLike, count: int, name: str) -> Ints:
-    """Return a set of points, (k,) indices or an (n,) bool mask, as indices in the order given.
+    """Return a set of points, an index, (k,) indices or an (n,) bool mask, as indices in the order given.
 
     Raises
     ------
@@ -226,7 +226,7 @@ def as_indices(chosen: ArrayLike, count: int, name: str) -> Ints:
         Neither whole numbers below n nor n truth values, or some points named several times.
     """
     mask = as_mask(chosen, count)
-    given = np.asarray(chosen)
+    given = np.atleast_1d(chosen)
     if given.dtype == bool or given.size == 0:
         return np.flatnonzero(mask)
     index = given.astype(np.int64) % count

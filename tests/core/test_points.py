@@ -246,3 +246,30 @@ def test_points_with_no_others_within_their_kernels_are_left_out():
     assert laplacian.areas[alone].max() < 1e-200
     assert any("no others within" in notice for notice in laplacian.notices)
     assert np.isfinite(laplacian.eigenpairs(4).eigenvalues).all()
+
+
+ONE = {  # calls that take points by their indices, with the index of one
+    "distance": lambda laplacian, one: core.geodesic_distance(laplacian, one),
+    "nearest": lambda laplacian, one: core.nearest_source(laplacian, one),
+    "grow": lambda laplacian, one: core.grow(laplacian, one, 1.0),
+    "transport": lambda laplacian, one: core.transport(laplacian, one, [0.0, 1.0, 0.0]),
+    "map": lambda laplacian, one: core.logarithmic_map(laplacian, one),
+    "fixed": lambda laplacian, one: core.solve_poisson(laplacian, laplacian.points[:, 0], one, 0.0),
+    "inpaint": lambda laplacian, one: core.inpaint(laplacian, one, [2.0]),
+    "region": lambda laplacian, one: core.measure_region(laplacian, one).area,
+    "left out": lambda laplacian, one: core.build_laplacian(laplacian.points, left_out=one).areas,
+}
+
+
+@pytest.mark.parametrize("call", ONE.values(), ids=ONE)
+def test_the_index_of_one_point_is_a_set_of_points(operators, call):
+    laplacian = operators("even sphere")
+    expected = call(laplacian, [700])
+    np.testing.assert_array_equal(call(laplacian, 700), expected)
+    np.testing.assert_array_equal(call(laplacian, np.int64(700)), expected)
+
+
+@pytest.mark.parametrize("wrong", [True, 7.0, 2500, "seven"])
+def test_no_index_of_one_point(operators, wrong):
+    with pytest.raises(core.InvalidPointsError, match="Give whole numbers below 2500"):
+        core.geodesic_distance(operators("even sphere"), wrong)

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...algebra import TwoGrid
-from ...arguments import as_array, as_doubles, check_array, check_finite
+from ...arguments import as_doubles, check_array, check_finite
 from ...errors import InvalidPointsError
 from ...geometry import as_indices
 from ...operator import LaplaceBeltrami, connection_laplacian, tangent_frames
@@ -200,7 +200,7 @@ class Transport:
             The solver did not converge.
         """
         laplacian, frames = self._laplacian, self.frames
-        chosen = as_indices(np.atleast_1d(as_array(source, "Sources")), len(frames), "sources")
+        chosen = as_indices(source, len(frames), "sources")
         if len(chosen) != 1:
             raise InvalidPointsError(f"There are {len(chosen)} sources. Give the one point at the center of the map.")
         source = int(chosen[0])
