@@ -13,6 +13,7 @@ unit sphere, where answers are known:
 
 import ast
 import importlib
+import re
 import threading
 from pathlib import Path
 from types import ModuleType
@@ -22,22 +23,23 @@ from .errors import BrokenLibraryError
 
 
 def _read_homes() -> dict[str, str]:
-    """Return the module of each public name, from the stub, which type checkers read, too."""
+    """Return the module of each public name or package, from the stub, which type checkers read, too."""
     stub = ast.parse(Path(__file__).with_name("__init__.pyi").read_text(encoding="utf-8"))
     imports = [node for node in stub.body if isinstance(node, ast.ImportFrom)]
-    return {alias.name: node.module or "" for node in imports for alias in node.names}
+    return {alias.name: node.module or alias.name for node in imports for alias in node.names}
 
 
 _HOMES = _read_homes()
-_PACKAGES = (*{home.partition(".")[0] for home in _HOMES.values()}, "files", "tiles")
 _lock = threading.RLock()  # scipy imports itself in circles, which two threads at once might enter from two sides
 
-__all__ = sorted(_HOMES)
+__all__ = sorted(name for name, home in _HOMES.items() if name != home)
 
 
 def __getattr__(name: str) -> Any:
     """Import the module of a public name, or a package, when it is first used: scipy takes a second."""
-    if name not in _HOMES and name not in _PACKAGES:
+    if name == "__version__":
+        return _version()
+    if name not in _HOMES and name not in _HOMES.values():
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     home = _HOMES.get(name, name)
     with _lock:
@@ -48,7 +50,18 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__, *_PACKAGES})
+    return sorted({*globals(), *_HOMES, "__version__"})
+
+
+def _version() -> str:
+    """Return the version: of the extension or the tree that this is in, or of the installed wheel."""
+    manifest = Path(__file__).parents[1] / "blender_manifest.toml"
+    if not manifest.exists():
+        from importlib import metadata  # here, as it takes as long as all else of this module
+
+        return metadata.version(__name__)
+    [found] = re.findall(r'^version = "(.+)"', manifest.read_text(encoding="utf-8"), re.MULTILINE)
+    return str(found)
 
 
 def _import(name: str) -> ModuleType:

@@ -1,5 +1,11 @@
 """The public names of core, a line each, and where they are: `core/__init__.py` imports them as they are asked for."""
 
+from . import files as files
+from . import geometry as geometry
+from . import operator as operator
+from . import paper as paper
+from . import splats as splats
+from . import tiles as tiles
 from .applications.alignment import Alignment as Alignment
 from .applications.alignment import align as align
 from .applications.alignment import match_places as match_places
@@ -136,3 +142,5 @@ from .splats import Splats as Splats
 from .splats import floaters as floaters
 from .splats import read_splats as read_splats
 from .splats import write_splats as write_splats
+
+__version__: str

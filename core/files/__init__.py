@@ -1,28 +1,50 @@
 """Point files to arrays in double precision and back, usable outside Blender: numpy only, and laspy for LAS and LAZ."""
 
-from .digits import Digits, join_digits, split_digits
-from .formats import (
-    READABLE,
-    SCANS,
-    SPLATS,
-    TEXTS,
-    WRITABLE,
-    doubts,
-    precision_notices,
-    read_points,
-    reading,
-    write_pieces,
-    write_points,
-)
-from .frames import frame_number, numbered_files, order_frames
-from .las_choices import LasChoices, parse_classes
-from .las_form import LasForm, join_forms
-from .lines import brief
-from .mesh import MESHES, write_mesh
-from .notices import join_notices
-from .origin import choose_origin, is_coarse
-from .pieces import Chunks, Extent, chunks, extent, has_levels, join_pieces
-from .ply import PlyVertices, read_elements, read_vertex_columns, read_vertex_names, write_vertex_columns
-from .rows import unpacks_too_far
-from .table import CHANNELS, FARTHEST, SCANNER, PointTable, check_places, full_color, split_columns, unit_colors
-from .whole import replacing
+from .digits import Digits as Digits
+from .digits import join_digits as join_digits
+from .digits import split_digits as split_digits
+from .formats import READABLE as READABLE
+from .formats import SCANS as SCANS
+from .formats import SPLATS as SPLATS
+from .formats import TEXTS as TEXTS
+from .formats import WRITABLE as WRITABLE
+from .formats import doubts as doubts
+from .formats import precision_notices as precision_notices
+from .formats import read_points as read_points
+from .formats import reading as reading
+from .formats import write_pieces as write_pieces
+from .formats import write_points as write_points
+from .frames import frame_number as frame_number
+from .frames import numbered_files as numbered_files
+from .frames import order_frames as order_frames
+from .las_choices import LasChoices as LasChoices
+from .las_choices import parse_classes as parse_classes
+from .las_form import LasForm as LasForm
+from .las_form import join_forms as join_forms
+from .lines import brief as brief
+from .mesh import MESHES as MESHES
+from .mesh import write_mesh as write_mesh
+from .notices import join_notices as join_notices
+from .origin import choose_origin as choose_origin
+from .origin import is_coarse as is_coarse
+from .pieces import Chunks as Chunks
+from .pieces import Extent as Extent
+from .pieces import chunks as chunks
+from .pieces import extent as extent
+from .pieces import has_levels as has_levels
+from .pieces import join_pieces as join_pieces
+from .ply import PlyVertices as PlyVertices
+from .ply import read_elements as read_elements
+from .ply import read_vertex_columns as read_vertex_columns
+from .ply import read_vertex_names as read_vertex_names
+from .ply import write_vertex_columns as write_vertex_columns
+from .rows import unpacks_too_far as unpacks_too_far
+from .table import CHANNELS as CHANNELS
+from .table import FARTHEST as FARTHEST
+from .table import SCANNER as SCANNER
+from .table import PointTable as PointTable
+from .table import check_places as check_places
+from .table import full_color as full_color
+from .table import split_columns as split_columns
+from .table import unit_colors as unit_colors
+from .whole import replacing as replacing

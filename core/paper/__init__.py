@@ -1,6 +1,11 @@
 """The paper as it stands, equation by equation: its area elements, its normals, its operator, its theorem."""
 
-from .areas import algorithm_1, constrained_areas, regularized_areas
-from .normals import covariance_normals
-from .operator import build_laplacian, projected_distance, unsymmetrized_operator
-from .stability import Stability, check_stability
+from .areas import algorithm_1 as algorithm_1
+from .areas import constrained_areas as constrained_areas
+from .areas import regularized_areas as regularized_areas
+from .normals import covariance_normals as covariance_normals
+from .operator import build_laplacian as build_laplacian
+from .operator import projected_distance as projected_distance
+from .operator import unsymmetrized_operator as unsymmetrized_operator
+from .stability import Stability as Stability
+from .stability import check_stability as check_stability

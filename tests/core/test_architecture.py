@@ -5,6 +5,7 @@ import functools
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -188,7 +189,15 @@ def test_a_wing_lists_only_what_others_use():
         above = [path for other in BELOW for path in modules_of(other)]
         used = {name.rpartition(".")[2] for path in above for name in imported(path) if f".{wing}." in name}
         outside = {name.removeprefix(f".{wing}.") for path in BLENDER_SIDE for name in taken(path)}
-        assert listed == used | {name for name, home in core._HOMES.items() if home == wing} | (outside & listed)
+        assert listed == used | {name for name in core.__all__ if core._HOMES[name] == wing} | (outside & listed)
+
+
+@pytest.mark.parametrize("package", ["files", "paper", "splats", "tiles"])
+def test_public_packages_name_what_they_export_as_type_checkers_ask_for_it(package):
+    tree = ast.parse((ROOT / "core" / package / "__init__.py").read_text(encoding="utf-8"))
+    names = [alias for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) for alias in node.names]
+    assert names
+    assert [alias.name for alias in names if alias.asname != alias.name] == []
 
 
 def test_core_needs_numpy_and_scipy_only():
@@ -216,6 +225,7 @@ def test_public_names_are_what_their_modules_hold():
     assert set(core.__all__) <= set(dir(core))
     for name in core.__all__:
         assert getattr(core, name).__module__.startswith("core."), name
+    assert {"files", "paper", "splats", "tiles", "__version__"} <= set(dir(core))
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         core.nothing  # noqa: B018
 
@@ -270,3 +280,8 @@ def test_core_is_usable_from_the_repository_root_without_blender():
 
 def test_core_never_uses_the_warnings_module():
     assert [file.name for file in (ROOT / "core").rglob("*.py") if "warnings" in imported(file)] == []
+
+
+def test_the_version_is_that_of_the_extension():
+    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
+    assert core.__version__ == manifest["version"]

@@ -26,7 +26,7 @@ def test_it_holds_the_packages_in_the_tree_and_nothing_else(wheel):
         return {path.as_posix() for path in found if "__pycache__" not in path.parts}
 
     wanted = {f"{NAME}/{path}" for ending in ("*.py", "*.pyi", "py.typed") for path in sources("core", ending)}
-    wanted |= {f"{NAME}/command/{path}" for path in sources("command", "*.py")}
+    wanted |= {f"{NAME}/command/{path}" for path in sources("command", "*.py")} | {f"{NAME}/__main__.py"}
     with zipfile.ZipFile(wheel) as packed:
         assert {name for name in packed.namelist() if ".dist-info/" not in name} == wanted
 
@@ -34,6 +34,18 @@ def test_it_holds_the_packages_in_the_tree_and_nothing_else(wheel):
 def test_it_has_the_version_of_the_extension(wheel):
     manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
     assert wheel.name == f"{NAME}-{manifest['version']}-py3-none-any.whl"
+
+
+def test_it_says_its_version(bare, tmp_path):
+    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
+    code = f"import sys, {NAME} as mf; print(mf.__version__, 'scipy' in sys.modules)"
+    assert python(bare, code, tmp_path).split() == [manifest["version"], "False"]
+
+
+def test_it_is_a_program_of_any_python_that_has_it(bare, tmp_path):
+    printed = call(program(bare, "python"), "-m", NAME, "--help", cwd=tmp_path)
+    assert printed == call(program(bare, "meshfree"), "--help", cwd=tmp_path)
+    assert printed.startswith("usage: meshfree ")
 
 
 def test_it_asks_for_numpy_and_scipy_only(bare, tmp_path):
@@ -96,10 +108,12 @@ import meshfree_laplacian as mf
 
 laplacian = mf.build_laplacian(np.zeros((5, 3)), options=mf.LaplacianOptions(neighbors=6))
 count: int = len(laplacian.eigenpairs(3).eigenvalues)
+version: str = mf.__version__
+tile: mf.tiles.Tile = mf.tiles.cut(laplacian.points, 2)[0]
 mf.LaplacianOptions(neighbours=6)
 areas: str = laplacian.areas
 """
-WRONG = {8: "call-arg", 9: "assignment"}  # lines of it, and what mypy calls their mistakes
+WRONG = {10: "call-arg", 11: "assignment"}  # lines of it, and what mypy calls their mistakes
 
 
 def test_type_checkers_know_its_calls(place, tmp_path):
