@@ -109,6 +109,14 @@ class LaplaceBeltrami:
     agreed: Agreed
     notices: list[str]
 
+    def __repr__(self) -> str:
+        components = np.max(self.component, initial=-1) + 1
+        left_out = np.count_nonzero(self.component < 0)
+        return (
+            f"<LaplaceBeltrami: {len(self.points)} points, {components} component{'' if components == 1 else 's'},"
+            f" area {self.areas.sum():.6g}{f', {left_out} left out' if left_out else ''}>"
+        )
+
     @property
     def quadric_mean_curvature(self) -> Floats:
         """Mean curvature of local quadrics through the nearest points, (n,) [1 / L].

@@ -100,6 +100,15 @@ class TestAccuracy:
         assert fine < 1.2e-3
 
 
+def test_it_says_what_it_is_of():
+    one, far = fibonacci_sphere(400), fibonacci_sphere(900) + [9.0, 0.0, 0.0]
+    assert repr(core.build_laplacian(one)).startswith("<LaplaceBeltrami: 400 points, 1 component, area 12.5")
+    both = core.build_laplacian(np.concatenate([one, far, [[4.0, 0.0, 0.0]]]))
+    area = f"{both.areas.sum():.6g}"
+    assert repr(both) == f"<LaplaceBeltrami: 1301 points, 2 components, area {area}, 1 left out>"
+    assert float(area) == pytest.approx(8.0 * np.pi, rel=1e-3)
+
+
 class TestApply:
     def test_columns_one_by_one(self, torus):
         both = torus.apply(torus.points[:, :2])
