@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from numbers import Integral, Real
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .errors import InvalidPointsError, PointCloudError
-from .types import Array, Floats
+from .types import Array, FilePath, Floats
 
 Shape: TypeAlias = tuple[int | None, ...]
 
@@ -60,6 +61,20 @@ def not_negative(given: Any, name: str) -> float:
     if not 0.0 <= number < np.inf:
         raise PointCloudError(f"The {name} is {given!r}. Use a number that is not negative.")
     return number
+
+
+def as_path(given: FilePath) -> Path:
+    """Return the path of a name.
+
+    Raises
+    ------
+    PointCloudError
+        It is neither a text nor path-like.
+    """
+    try:
+        return Path(given)
+    except TypeError as error:
+        raise PointCloudError(f"{given!r} is no name of a file. Give a text or a path.") from error
 
 
 def check_switches(**switches: Any) -> None:

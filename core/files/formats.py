@@ -10,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ..arguments import as_path
 from ..errors import InvalidPointsError, NotEnoughMemoryError, PointCloudError
-from ..types import Floats
+from ..types import FilePath, Floats
 from .arrays import read_array
 from .e57 import read_e57
 from .las import read_las
@@ -58,12 +59,12 @@ SPLATS = (".splat", ".spz")  # of Gaussian splats alone, which core.splats reads
 _PACKED = (".ksplat", ".sog", ".lcc")  # of such, which other programs convert
 
 
-def read_points(path: Path, columns: str = "", las: LasChoices = LasChoices()) -> PointTable:
+def read_points(path: FilePath, columns: str = "", las: LasChoices = LasChoices()) -> PointTable:
     """Read the points of a file of one of the kinds in `READABLE`.
 
     Parameters
     ----------
-    path : pathlib.Path
+    path : path-like
     columns : str
         Names of the columns of a file of one of the kinds in `TEXTS`, in their order, such as "x y z - r g b", where -
         leaves one out, and ... at the end all that follow. Empty to find them.
@@ -80,6 +81,7 @@ def read_points(path: Path, columns: str = "", las: LasChoices = LasChoices()) -
         There is no such file, or no points in it, or it is broken; the text says where. Or columns are named that the
         file does not have.
     """
+    path = as_path(path)
     suffix = path.suffix.lower()
     _check_there(path)
     if suffix in SPLATS:
@@ -107,8 +109,9 @@ def check_columns(path: Path, columns: str) -> None:
         raise PointCloudError(f"{path} names its columns itself. Give Columns only with {', '.join(TEXTS)}.")
 
 
-def doubts(table: PointTable, path: Path) -> Iterator[str]:
+def doubts(table: PointTable, path: FilePath) -> Iterator[str]:
     """Yield notices about units and precision of the coordinates of a table."""
+    path = as_path(path)
     units = np.ones(3)
     if table.degrees or look_like_degrees(table.points):
         known = "are" if table.degrees else "look like"
@@ -121,30 +124,31 @@ def doubts(table: PointTable, path: Path) -> Iterator[str]:
         yield from precision_notices(table.points, path, units)
 
 
-def precision_notices(points: Floats, path: Path, units: Floats | float = 1.0) -> Iterator[str]:
+def precision_notices(points: Floats, path: FilePath, units: Floats | float = 1.0) -> Iterator[str]:
     """Report that points, (n, 3), were kept in single precision, where its steps, in some units, are too coarse."""
     steps = units * np.spacing(np.abs(points).max(axis=0).astype(np.float32))
     if steps.max() * 8192.0 > np.ptp(points, axis=0).max():
         step = np.spacing(np.float32(np.abs(points).max()))
         yield (
-            f"{path.name}: its coordinates are kept in single precision, in steps of {step:.2g}. Export it in double"
-            " precision, or with a shift."
+            f"{as_path(path).name}: its coordinates are kept in single precision, in steps of {step:.2g}. Export it in"
+            " double precision, or with a shift."
         )
 
 
 @contextmanager
-def reading(path: Path) -> Iterator[None]:
+def reading(path: FilePath) -> Iterator[None]:
     """Convert errors while a file is read into typed ones that state its name and what to do.
 
     Parameters
     ----------
-    path : pathlib.Path
+    path : path-like
 
     Raises
     ------
     PointCloudError
         There is no such file, or it is broken.
     """
+    path = as_path(path)
     _check_there(path)
     try:
         with np.errstate(invalid="ignore", over="ignore"):  # in numbers that are refused, or kept as infinite
@@ -168,12 +172,12 @@ def _check_there(path: Path) -> None:
         raise PointCloudError(f"There is no file {path}. Check its name and folder.")
 
 
-def write_points(path: Path, table: PointTable, double: bool = True) -> list[str]:
+def write_points(path: FilePath, table: PointTable, double: bool = True) -> list[str]:
     """Write a table to a file of one of the kinds in `WRITABLE`; an older file stays if that fails.
 
     Parameters
     ----------
-    path : pathlib.Path
+    path : path-like
     table : PointTable
     double : bool
         Whether coordinates are kept in double precision, as always in LAS and LAZ.
@@ -186,14 +190,14 @@ def write_points(path: Path, table: PointTable, double: bool = True) -> list[str
     return _write(path, lambda: [table], double)
 
 
-def write_pieces(path: Path, tables: Callable[[], Iterable[PointTable]]) -> list[str]:
+def write_pieces(path: FilePath, tables: Callable[[], Iterable[PointTable]]) -> list[str]:
     """Write tables one after the other to a file of one of the kinds in `WRITABLE`.
 
     Memory is that of one of them. An older file stays if it fails.
 
     Parameters
     ----------
-    path : pathlib.Path
+    path : path-like
     tables : callable
         Returns an iterable of tables with the same attributes, the same each time: they are looked at twice, once for
         their number, ranges and types.
@@ -219,7 +223,8 @@ def write_pieces(path: Path, tables: Callable[[], Iterable[PointTable]]) -> list
     return _write(path, tables)
 
 
-def _write(path: Path, tables: Callable[[], Iterable[PointTable]], double: bool = True) -> list[str]:
+def _write(path: FilePath, tables: Callable[[], Iterable[PointTable]], double: bool = True) -> list[str]:
+    path = as_path(path)
     suffix = path.suffix.lower()
     if suffix not in WRITABLE:
         raise PointCloudError(f"Points cannot be written to {path}. Give it one of {', '.join(WRITABLE)}.")

@@ -1,9 +1,11 @@
 """The frames of a sequence: numbered files of one folder."""
 
 import re
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 
+from ..arguments import as_path
 from ..errors import PointCloudError
 from ..types import FilePath
 from .formats import READABLE, SPLATS
@@ -11,14 +13,14 @@ from .formats import READABLE, SPLATS
 _NUMBERED = re.compile(r"(.*?)(\d+)(\D*)", re.ASCII)
 
 
-def numbered_files(folder: Path) -> list[Path]:
+def numbered_files(folder: FilePath) -> list[Path]:
     """Find the frames of a sequence: the files with points in a folder whose names differ by a number alone.
 
     Files without a number are not frames. See `order_frames`.
 
     Parameters
     ----------
-    folder : pathlib.Path
+    folder : path-like
 
     Returns
     -------
@@ -30,6 +32,7 @@ def numbered_files(folder: Path) -> list[Path]:
     PointCloudError
         There is no such folder, no numbered file, or files of several names.
     """
+    folder = as_path(folder)
     try:
         paths = [path for path in folder.iterdir() if path.suffix.lower() in (*READABLE, *SPLATS)]
     except OSError as error:
@@ -43,12 +46,12 @@ def numbered_files(folder: Path) -> list[Path]:
     return order_frames(frames)
 
 
-def order_frames(paths: list[Path]) -> list[Path]:
+def order_frames(paths: Sequence[FilePath]) -> list[Path]:
     """Put files in the order of the last number in their names, however many digits it has.
 
     Parameters
     ----------
-    paths : sequence of pathlib.Path
+    paths : sequence of path-like
 
     Returns
     -------
@@ -59,7 +62,7 @@ def order_frames(paths: list[Path]) -> list[Path]:
     PointCloudError
         A name without a number, names that differ by more than that, or the same number twice.
     """
-    found = [(path, _parts(path)) for path in paths]
+    found = [(path, _parts(path)) for path in map(as_path, paths)]
     patterns = sorted({f"{match[1]}#{match[3]}{path.suffix}" for path, match in found})
     if len(patterns) > 1:
         shown = ", ".join(patterns[:3]) + (", ..." if len(patterns) > 3 else "")
@@ -73,7 +76,7 @@ def order_frames(paths: list[Path]) -> list[Path]:
 
 def frame_number(path: FilePath) -> int:
     """Return the last number in the name of a file, by which `order_frames` sorts."""
-    return int(_parts(Path(path))[2])
+    return int(_parts(as_path(path))[2])
 
 
 def _parts(path: Path) -> re.Match[str]:

@@ -6,8 +6,9 @@ from typing import TextIO
 
 import numpy as np
 
+from ..arguments import as_path
 from ..errors import PointCloudError
-from ..types import Array, Ints
+from ..types import Array, FilePath, Ints
 from .origin import is_coarse
 from .ply import write_ply
 from .polygons import triangles
@@ -17,12 +18,12 @@ from .whole import replacing
 _BLOCK = 10_000  # lines that are written at once
 
 
-def write_mesh(path: Path, table: PointTable, faces: list[Ints], double: bool = True) -> list[str]:
+def write_mesh(path: FilePath, table: PointTable, faces: list[Ints], double: bool = True) -> list[str]:
     """Write a mesh to a file of one of the kinds in `MESHES`; an older file stays if that fails.
 
     Parameters
     ----------
-    path : pathlib.Path
+    path : path-like
     table : PointTable
         The vertices.
     faces : sequence of ndarray, (m, k) int
@@ -35,6 +36,7 @@ def write_mesh(path: Path, table: PointTable, faces: list[Ints], double: bool = 
     list of str
         Notices of differences between what was given and what is written.
     """
+    path = as_path(path)
     suffix = path.suffix.lower()
     if suffix not in MESHES:
         raise PointCloudError(f"A mesh cannot be written to {path}. Give it one of {', '.join(MESHES)}.")

@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import as_path
 from ..errors import InvalidPointsError
-from ..types import Array, Floats
+from ..types import Array, FilePath, Floats
 from .arrays import array_pieces
 from .copc import Box
 from .e57 import e57_scans
@@ -133,7 +134,7 @@ class Chunks:
 
 
 def chunks(
-    path: Path | str,
+    path: FilePath,
     size: int = 1_000_000,
     *,
     bounds: ArrayLike | None = None,
@@ -149,7 +150,7 @@ def chunks(
 
     Parameters
     ----------
-    path : pathlib.Path
+    path : path-like
     size : int
         Points of a piece at most.
     bounds : array_like, (2, 3), optional
@@ -188,7 +189,7 @@ def chunks(
     []
     [300, 300, 200]
     """
-    path = Path(path)
+    path = as_path(path)
     if size < 1:
         raise InvalidPointsError(f"Pieces of {size} points were asked for. Ask for at least 1.")
     box = None if bounds is None else np.asarray(bounds, dtype=np.float64)
@@ -202,15 +203,16 @@ def chunks(
     return Chunks(path, size, None if box is None else (box[0], box[1]), level, las, columns.strip())
 
 
-def has_levels(path: Path) -> bool:
+def has_levels(path: FilePath) -> bool:
     """Whether a file is a COPC file, whose points are in levels of detail."""
+    path = as_path(path)
     if path.suffix.lower() not in SCANS:
         return False
     with reading(path), opened_las(path) as file:
         return file.octree is not None
 
 
-def extent(path: Path | str, las: LasChoices = LasChoices()) -> Extent:
+def extent(path: FilePath, las: LasChoices = LasChoices()) -> Extent:
     """Find how many points a file has, their box, and what other numbers they have.
 
     Of LAS and LAZ files these are what the header states, those that `las` leaves out included; other files are read,
@@ -218,11 +220,11 @@ def extent(path: Path | str, las: LasChoices = LasChoices()) -> Extent:
 
     Parameters
     ----------
-    path : pathlib.Path
+    path : path-like
     las : LasChoices
         Which points of LAS files would be read, and in which unit.
     """
-    path = Path(path)
+    path = as_path(path)
     if path.suffix.lower() in SCANS:
         with reading(path), opened_las(path) as file:
             header, names = file.reader.header, file.names(las.withheld)
@@ -238,7 +240,7 @@ def extent(path: Path | str, las: LasChoices = LasChoices()) -> Extent:
 
 def join_pieces(
     pieces: Sequence[tuple[Floats, dict[str, Array]]],
-    path: Path,
+    path: FilePath,
     single: bool = False,
     degrees: bool = False,
     las: LasForm | None = None,
@@ -249,7 +251,7 @@ def join_pieces(
     ----------
     pieces : sequence of (ndarray, dict of str to ndarray)
         As `chunks` yields them.
-    path : pathlib.Path
+    path : path-like
         For the texts of notices.
     single, degrees : bool
         As of `PointTable`.
@@ -266,6 +268,7 @@ def join_pieces(
     TooFewPointsError
         There are no points.
     """
+    path = as_path(path)
     table = PointTable(np.concatenate([np.empty((0, 3)), *(points for points, _ in pieces)]), single=single, las=las)
     check_places(table.points, path)
     table.degrees = degrees

@@ -9,8 +9,9 @@ from typing import BinaryIO, NamedTuple
 
 import numpy as np
 
+from ..arguments import as_path
 from ..errors import InvalidPointsError
-from ..types import Array, Ints
+from ..types import Array, FilePath, Ints
 from .ascii_words import ascii_words
 from .lines import brief
 from .ply_lists import Code, end_of_records, first_list, read_fixed
@@ -83,8 +84,9 @@ def read_ply(path: Path) -> PointTable:
     return table
 
 
-def read_vertex_columns(path: Path) -> PlyVertices:
+def read_vertex_columns(path: FilePath) -> PlyVertices:
     """Read the vertices of a PLY file in its types; errors as of `read_ply`."""
+    path = as_path(path)
     with open(path, "rb") as file:
         order, before, vertex, after, comments, notices = _read_vertex(file, path)
         if order is None:
@@ -190,14 +192,15 @@ def _rest_notices(
     ]
 
 
-def read_vertex_names(path: Path) -> list[str]:
+def read_vertex_names(path: FilePath) -> list[str]:
     """Read the names of the properties of the vertices of a PLY file; none if it has no vertices."""
+    path = as_path(path)
     with open(path, "rb") as file:
         elements = _read_header(file, path)[1]
     return next((element.names for element in elements if element.name == "vertex"), [])
 
 
-def read_elements(path: Path) -> tuple[str | None, list[str], dict[str, dict[str, Array]]]:
+def read_elements(path: FilePath) -> tuple[str | None, list[str], dict[str, dict[str, Array]]]:
     """Read all elements of a PLY file without lists, in its types; errors as of `read_ply`.
 
     Returns
@@ -209,7 +212,7 @@ def read_elements(path: Path) -> tuple[str | None, list[str], dict[str, dict[str
     dict of str to dict of str to ndarray
         By the names of the elements, their columns by the names of the properties.
     """
-    found: dict[str, dict[str, Array]] = {}
+    path, found = as_path(path), dict[str, dict[str, Array]]()
     before: list[_Element] = []
     with open(path, "rb") as file:
         order, elements, comments = _read_header(file, path)
@@ -315,7 +318,7 @@ def write_ply(path: Path, table: PointTable, double: bool = True, faces: Sequenc
 
 
 def write_vertex_columns(
-    path: Path,
+    path: FilePath,
     columns: Columns,
     order: str = "<",
     comments: Sequence[str] = (),
@@ -325,7 +328,7 @@ def write_vertex_columns(
 
     Parameters
     ----------
-    path : pathlib.Path
+    path : path-like
     columns : dict of str to ndarray, (n,)
     order, comments
         See there.
@@ -335,7 +338,7 @@ def write_vertex_columns(
     """
     polygons = [corners for corners in faces if len(corners)]
     divided = polygons if len(polygons) < 2 else [_all_triangles(polygons, columns)]
-    notices = write_vertex_pieces(path, lambda: [columns], order, comments, divided)
+    notices = write_vertex_pieces(as_path(path), lambda: [columns], order, comments, divided)
     if len(polygons) > 1:
         notices.append(
             "Quads were divided into triangles, since some programs read no PLY file with both. No point is lost."

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InvalidPointsError, TooFewPointsError
-from ..types import Array, Bools, Floats
+from ..types import Array, Bools, FilePath, Floats
 from .las_form import LasForm
 from .lines import brief
 
@@ -271,7 +271,7 @@ class Missed:
             yield f"{path.name}: left out {self.count} points that the sensor missed ({self.values})."
 
 
-def check_places(points: Floats, path: Path) -> float:
+def check_places(points: Floats, path: FilePath) -> float:
     """Refuse a file without points, or with coordinates that are not finite or too large, and return the largest."""
     if len(points) == 0:
         raise TooFewPointsError(f"{path} has no points. Give a file with points.")

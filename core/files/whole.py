@@ -5,18 +5,20 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from ..arguments import as_path
 from ..errors import PointCloudError
+from ..types import FilePath
 
 
 @contextmanager
-def replacing(path: Path) -> Iterator[Path]:
+def replacing(path: FilePath) -> Iterator[Path]:
     """Provide a temporary file beside this one to write to, which replaces it at the end.
 
     If writing fails, an older file stays. The folder is created if it is missing.
 
     Parameters
     ----------
-    path : pathlib.Path
+    path : path-like
 
     Yields
     ------
@@ -28,6 +30,7 @@ def replacing(path: Path) -> Iterator[Path]:
     PointCloudError
         The file or its folder cannot be written to.
     """
+    path = as_path(path)
     temporary = path.with_name(f".{path.stem}.part{path.suffix}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -6,6 +6,7 @@ from typing import NamedTuple, NoReturn, Self
 
 import numpy as np
 
+from ..arguments import as_path
 from ..errors import InvalidPointsError, PointCloudError
 from ..files import (
     FARTHEST,
@@ -77,7 +78,7 @@ class SplatFile(NamedTuple):
 
 def holds_splats(path: FilePath) -> bool:
     """Whether a file is one of splats, by its first bytes or name; broken PLY files are not."""
-    path = _path(path)
+    path = as_path(path)
     try:
         with reading(path):
             return _reader(path) is not None
@@ -85,12 +86,12 @@ def holds_splats(path: FilePath) -> bool:
         return False
 
 
-def read_file(path: Path, read: Callable[[Path], PointTable] = read_points) -> PointTable | Splats:
+def read_file(path: FilePath, read: Callable[[Path], PointTable] = read_points) -> PointTable | Splats:
     """Read the splats of a file, or its points if it has no splats.
 
     Parameters
     ----------
-    path : pathlib.Path
+    path : path-like
     read : callable
         Reader of points.
 
@@ -104,12 +105,13 @@ def read_file(path: Path, read: Callable[[Path], PointTable] = read_points) -> P
     PointCloudError
         There is no such file, or it is broken, or of an unknown kind.
     """
+    path = as_path(path)
     if holds_splats(path):
         return read_splats(path)
     table = read(path)
     missing = near_miss((*PLACES, *table.attributes))
     if missing:
-        table.notices.append(f"{Path(path).name} {missing}")
+        table.notices.append(f"{path.name} {missing}")
     return table
 
 
@@ -135,7 +137,7 @@ def read_splats(path: FilePath) -> Splats:
     InvalidPointsError
         It is broken, or holds no splats; the text says what is missing.
     """
-    path = _path(path)
+    path = as_path(path)
     with reading(path):
         return _from_vertices((_reader(path) or _refuse)(path), path)
 
@@ -237,7 +239,7 @@ def write_splats(path: FilePath, splats: Splats) -> None:
     PointCloudError
         The name ends otherwise, or there is no splat.
     """
-    path = _path(path)
+    path = as_path(path)
     if not isinstance(splats, Splats):
         raise PointCloudError(
             f"The data to be written to {path} are {type(splats).__name__}, not Splats. Make Splats first."
@@ -262,14 +264,6 @@ def _needs_double(positions: Floats) -> bool:
     """Whether single precision would lose digits of positions that were not read in it."""
     lost = np.abs(positions.astype(np.float32) - positions).max()
     return is_coarse(positions) and lost > _LOST * np.ptp(positions, axis=0).max()
-
-
-def _path(given: FilePath) -> Path:
-    """Return the path of a name."""
-    try:
-        return Path(given)
-    except TypeError as error:
-        raise PointCloudError(f"{given!r} is no name of a file. Give a text or a path.") from error
 
 
 def encoded(splats: Splats, columns: dict[str, Array]) -> dict[str, Floats]:

@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
+from ..arguments import as_path
 from ..errors import InvalidPointsError, NotEnoughMemoryError, PointCloudError, TooFewPointsError
 from ..geometry import check_points
 from ..memory import needed_memory
 from ..options import LaplacianOptions
-from ..types import Array, Floats
+from ..types import Array, FilePath, Floats
 from .cut import HALO, NARROWEST, Plan, Room, spacing_around, spacings_away
 from .roughness import asked_wavelength
 from .seen import checked_viewpoint, orientation
@@ -36,7 +37,7 @@ _PLACE = "coordinates of the point"  # in rows, beside columns of any names
 
 def cut_to_store(
     chunks: Callable[[], Chunks],
-    folder: str | os.PathLike[str],
+    folder: FilePath,
     most: int,
     options: LaplacianOptions = LaplacianOptions(),
     *,
@@ -96,7 +97,7 @@ def cut_to_store(
     ...     print([len(store.own(number)) for number in range(store.count)])
     [200, 200, 200, 200]
     """
-    folder = Path(folder)
+    folder = as_path(folder)
     if folder.exists():
         raise PointCloudError(f"{folder} exists. Go on with it, or choose another folder.")
     if most < 1:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable, Sequence
 
-from ..types import Progress
+from ..types import FilePath, Progress
 from .cutting import HALOS
 from .modes import MODES
 from .steps import MEASURE, Step, agree, part_of, survey_steps, visit
@@ -29,7 +28,7 @@ def pending(store: Store) -> tuple[Step, list[int]] | None:
     return None
 
 
-def visit_tile(folder: str | os.PathLike[str], step: str, number: int) -> int:
+def visit_tile(folder: FilePath, step: str, number: int) -> int:
     """Take a step at a tile of a store, in whatever process, and return its number.
 
     Parameters

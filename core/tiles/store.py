@@ -14,10 +14,11 @@ from typing import IO, Any
 
 import numpy as np
 
+from ..arguments import as_path
 from ..errors import PointCloudError
 from ..files import replacing
 from ..options import LaplacianOptions
-from ..types import Array, Floats
+from ..types import Array, FilePath, Floats
 from .shelf import Part, Record, Told, visited
 
 VERSION = 3
@@ -49,8 +50,8 @@ class Store:
         There is no such store, or it was written by another version.
     """
 
-    def __init__(self, folder: str | os.PathLike[str]) -> None:
-        self.folder = Path(folder)
+    def __init__(self, folder: FilePath) -> None:
+        self.folder = as_path(folder)
         try:
             self.manifest = json.loads((self.folder / _MANIFEST).read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
@@ -213,9 +214,9 @@ class Store:
         return self.folder / f"agreed-{step}.npz"
 
 
-def tile_folder(folder: Path, number: int) -> Path:
+def tile_folder(folder: FilePath, number: int) -> Path:
     """Return the folder of a tile in that of a store."""
-    return folder / f"{number:06d}"
+    return as_path(folder) / f"{number:06d}"
 
 
 def _save(path: Path, arrays: Any) -> None:
