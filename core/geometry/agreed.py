@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
 
+from ..frozen import Frozen
 from ..types import Floats, Ints
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ _OF_POINTS = ("component", "sheet", "side")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Agreed:
+class Agreed(Frozen):
     """Every decision between points and matrix that takes more than the points around a place.
 
     `LaplaceBeltrami.agreed` holds those of an operator; `build_laplacian` takes them for the same points, or for some

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import ComponentError, TooFewPointsError
+from ..frozen import Frozen
 from ..options import LaplacianOptions, check_options
 from ..types import Bools, Floats, Ints, Progress, Report
 from .agreed import Agreed, Decisions
@@ -683,7 +684,7 @@ def estimate_normals(points: ArrayLike, options: LaplacianOptions = LaplacianOpt
 
 
 @dataclass(frozen=True, eq=False)
-class Discs:
+class Discs(Frozen):
     """Discs in the tangent planes of points, made by `surface_discs`.
 
     Attributes

@@ -11,6 +11,7 @@ from scipy import sparse
 
 from ..arguments import check_switches
 from ..errors import InvalidPointsError
+from ..frozen import Frozen
 from ..geometry import Agreed, Doubt, arc_length, check_points, check_values, move_apart, read_cloud, toward
 from ..kernel import SECOND_MOMENT
 from ..memory import check_memory
@@ -28,7 +29,7 @@ NARROW = 45  # neighbours inside the support of a narrow operator: the fewest th
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class LaplaceBeltrami:
+class LaplaceBeltrami(Frozen):
     """A discrete Laplace-Beltrami operator on points.
 
     Made by `build_laplacian`. One sign convention: `stiffness` K is positive semi-definite, `apply` gives the operator

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..frozen import Frozen
 from ..geometry import frames
 from ..types import Floats
 from .averaging import Averages, Settled, off_neighbors
@@ -20,7 +21,7 @@ _DECIDES = 0.5  # of a curvature's size: noise that leaves more decides it
 
 
 @dataclass(frozen=True, eq=False)
-class MeanCurvature:
+class MeanCurvature(Frozen):
     """The mean curvature of a surface at each point, made by `measure_mean_curvature`.
 
     Attributes
@@ -140,7 +141,7 @@ def _notices(laplacian: LaplaceBeltrami, averages: Averages, size: Floats, scatt
 
 
 @dataclass(frozen=True, eq=False)
-class PrincipalCurvatures:
+class PrincipalCurvatures(Frozen):
     """The greatest and the least curvature of a surface at each point, made by `principal_curvatures`.
 
     Attributes

@@ -15,6 +15,7 @@ from ..algebra import Rows, coarse_to_fine, lift_lowest
 from ..arguments import positive, whole
 from ..cores import cores
 from ..errors import SolverError, TooFewPointsError, UnresolvedModesError
+from ..frozen import Frozen
 from ..kernel import inverse_ratio, symbol
 from ..memory import check_mode_memory
 from ..types import Floats, Ints, Progress, Report
@@ -30,7 +31,7 @@ _FLAT = 4.0  # the symbol hardly rises beyond
 
 
 @dataclass(frozen=True)
-class Spectrum:
+class Spectrum(Frozen):
     """The lowest eigenpairs of the negated operator.
 
     Attributes

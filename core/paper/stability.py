@@ -7,11 +7,12 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..cores import cores
+from ..frozen import Frozen
 from ..operator import LaplaceBeltrami
 
 
 @dataclass(frozen=True, kw_only=True)
-class Stability:
+class Stability(Frozen):
     """The assumptions of Theorem 1 on a cloud, and its conclusions on the operator.
 
     Attributes

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..algebra import nearest_rotations
 from ..arguments import as_array, check_array, check_finite
+from ..frozen import Frozen
 from ..types import Array, Floats
 from .ellipsoids import mapped, matrices_of
 from .harmonics import COUNTS, rotated
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Splats:
+class Splats(Frozen):
     """Gaussian splats: points with an ellipsoid each, and a view-dependent colour.
 
     Attributes
@@ -79,6 +80,7 @@ class Splats:
         }
         for name, shape in shapes.items():
             object.__setattr__(self, name, _numbers(getattr(self, name), shape, name))
+        super().__post_init__()
 
     def __len__(self) -> int:
         return len(self.positions)

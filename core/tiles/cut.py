@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from ..arguments import real, whole
 from ..cores import cores
 from ..errors import InvalidPointsError
+from ..frozen import Frozen
 from ..geometry import FEW, check_points, spacing_of
 from ..memory import ADAPTIVE, points_in_kernel
 from ..options import LaplacianOptions
@@ -25,7 +26,7 @@ _NARROW = (NARROWEST / (NARROWEST + 2.0)) ** 2  # share of the points of a tile 
 
 
 @dataclass(frozen=True, eq=False)
-class Tile:
+class Tile(Frozen):
     """A box of a cloud, and a halo around it.
 
     Attributes

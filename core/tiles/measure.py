@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
+from ..frozen import Frozen
 from ..geometry import Agreed
 from ..operator import build_laplacian
 from ..options import LaplacianOptions
@@ -17,7 +18,7 @@ from .measures import results
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class Measured(Frozen):
     """The results in the box of a tile, (k,) each, as of `LaplaceBeltrami` of the whole cloud.
 
     Attributes

@@ -1,5 +1,7 @@
 """Gaussian splats: files bit for bit, ellipsoids under linear maps, harmonics that turn."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -279,7 +281,9 @@ def test_floaters_need_splats_with_finite_numbers():
     with pytest.raises(core.InvalidPointsError, match="not Splats"):
         core.floaters(np.zeros((5, 3)))
     splats = some_splats(20)
-    splats.scales[3] = np.nan
+    scales = splats.scales.copy()
+    scales[3] = np.nan
+    splats = replace(splats, scales=scales)
     with pytest.raises(core.InvalidPointsError, match="1 of 20"):
         core.floaters(splats)
     assert core.floaters(some_splats(5)).shape == (5,)

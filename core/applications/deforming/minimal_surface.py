@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from ...algebra import Iterate, conjugate_gradients
 from ...arguments import real, whole
 from ...errors import Cancelled, InvalidPointsError, NotASurfaceError, PointCloudError
+from ...frozen import Frozen
 from ...geometry import FEWEST, as_mask, check_points, find_nearest
 from ...operator import LaplaceBeltrami, build_laplacian
 from ...options import LaplacianOptions, check_options
@@ -32,7 +33,7 @@ _RTOL, _PRODUCTS = 1e-6, 500  # of the linear solves
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class MinimalSurface:
+class MinimalSurface(Frozen):
     """Points moved towards the least area with their fixed boundary.
 
     Attributes

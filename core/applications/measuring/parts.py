@@ -9,13 +9,14 @@ from numpy.typing import ArrayLike
 
 from ...arguments import check_array
 from ...errors import InvalidPointsError
+from ...frozen import Frozen
 from ...operator import LaplaceBeltrami
 from ...types import Bools, Floats, Ints, Progress
 from .regions import LENGTH_OFF, SurfaceMeasures, measure_region
 
 
 @dataclass(frozen=True)
-class Parts:
+class Parts(Frozen):
     """Measures of the parts of a surface, by the labels of their points in ascending order.
 
     Attributes

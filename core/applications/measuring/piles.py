@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 
 from ...arguments import as_doubles, check_array, check_plane
 from ...errors import InvalidPointsError
+from ...frozen import Frozen
 from ...geometry import as_mask
 from ...operator import LaplaceBeltrami
 from ...types import Bools, Floats, Ints
@@ -21,7 +22,7 @@ _NEAR = 7  # nearest points, the point itself among them, of which one is beyond
 
 
 @dataclass(frozen=True)
-class Pile:
+class Pile(Frozen):
     """The volume between a part of the surface and a plane, or another surface.
 
     Attributes

@@ -15,6 +15,7 @@ from scipy.special import erfinv, expit
 from ...algebra import blocks
 from ...arguments import as_array, check_array, check_finite
 from ...errors import InvalidPointsError
+from ...frozen import Frozen
 from ...geometry import FEW, SMOOTH, as_mask, move_apart
 from ...operator import LaplaceBeltrami
 from ...types import Bools, Floats, Ints, Progress
@@ -61,7 +62,7 @@ _BLOCK = 1 << 11  # windows at one time
 
 
 @dataclass(frozen=True)
-class Region:
+class Region(Frozen):
     """Measures of a part of the surface.
 
     Attributes

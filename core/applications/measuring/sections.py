@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...arguments import check_plane
+from ...frozen import Frozen
 from ...operator import ImplicitSurface, LaplaceBeltrami
 from ...types import Bools, Floats, Progress, Report
 from ..distance.paths import polygon_length
@@ -45,7 +46,7 @@ class SectionCurve(NamedTuple):
 
 
 @dataclass(frozen=True)
-class CrossSection:
+class CrossSection(Frozen):
     """The curves in which a plane cuts the surface.
 
     Attributes

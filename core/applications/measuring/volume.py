@@ -6,6 +6,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
+from ...frozen import Frozen
 from ...operator import ImplicitSurface, LaplaceBeltrami
 from ...types import Array, Bools, Floats, Ints, Progress
 from ..surfaces.meshing import SurfaceMesh, mesh_surface
@@ -17,7 +18,7 @@ _MIXED = 0.05  # share of the area whose normals may point to the other side bef
 
 
 @dataclass(frozen=True)
-class EnclosedVolume:
+class EnclosedVolume(Frozen):
     """The volume within a surface.
 
     Attributes

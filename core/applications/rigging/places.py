@@ -14,6 +14,7 @@ from ...algebra import blocks, on_all_cores
 from ...arguments import as_doubles, check_array, check_finite, positive
 from ...cores import cores
 from ...errors import InvalidPointsError, PointCloudError
+from ...frozen import Frozen
 from ...geometry import COUNT, SMOOTH, as_mask, balanced_weights, find_nearest, frames
 from ...operator import LaplaceBeltrami
 from ...types import Bools, Floats, Ints, Progress, Report
@@ -30,7 +31,7 @@ _BLOCK = 1 << 12
 
 
 @dataclass(frozen=True)
-class SurfaceMatch:
+class SurfaceMatch(Frozen):
     """Where points lie on the surface of others: of one source, or of several, one after another.
 
     Attributes
@@ -245,20 +246,15 @@ def _match(
         known[block] = (distance[block] <= limit) & ~((share != 0.0) & ~valid[chosen]).any(axis=1)
 
     on_all_cores(match, blocks(count, _BLOCK), report)
-    rows = own.kept[known]
-    result = SurfaceMatch(
-        np.zeros(len(target.points), dtype=bool),
-        np.full(len(target.points), np.inf),
-        sparse.csr_array(
-            (weight[known].ravel(), (np.repeat(rows, width), other.kept[index[known].ravel()])),
-            shape=(len(target.points), len(source.points)),
-        ),
-        np.full(len(target.points), -1),
-        limit,
+    rows, n = own.kept[known], len(target.points)
+    weights = sparse.csr_array(
+        (weight[known].ravel(), (np.repeat(rows, width), other.kept[index[known].ravel()])),
+        shape=(n, len(source.points)),
     )
-    result.weights.eliminate_zeros()
-    result.known[rows], result.distance[rows], result.nearest[rows] = True, distance[known], other.kept[first[known]]
-    return result
+    weights.eliminate_zeros()
+    found, away, nearest = np.zeros(n, dtype=bool), np.full(n, np.inf), np.full(n, -1)
+    found[rows], away[rows], nearest[rows] = True, distance[known], other.kept[first[known]]
+    return SurfaceMatch(found, away, weights, nearest, limit)
 
 
 def _signs(own: _Sheets, other: _Sheets, found: tuple[Floats, Ints], limit: float) -> Floats:

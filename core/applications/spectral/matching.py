@@ -9,13 +9,14 @@ from scipy.spatial import cKDTree
 
 from ...arguments import real
 from ...errors import InvalidPointsError, PointCloudError
+from ...frozen import Frozen
 from ...geometry import check_points, check_values
 from ...operator import Spectrum
 from ...types import Floats, Ints
 
 
 @dataclass(frozen=True)
-class MatchedModes:
+class MatchedModes(Frozen):
     """Modes in the order, and with the signs, of those of the frame before.
 
     Attributes

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from ...arguments import positive
 from ...cores import cores
 from ...errors import NotEnoughMemoryError, TooFewPointsError
+from ...frozen import Frozen
 from ...geometry import Prolongation, check_points
 from ...memory import available_memory
 from ...operator import ImplicitSurface, LaplaceBeltrami
@@ -33,7 +34,7 @@ _SHARE = 0.8  # of the free memory, which other programs need as well
 
 
 @dataclass(frozen=True)
-class SurfaceMesh:
+class SurfaceMesh(Frozen):
     """A mesh of a surface, which unpacks to its vertices and faces.
 
     Attributes
