@@ -17,6 +17,7 @@ from ..cores import cores
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import SMOOTH, check_points, read_surface
 from ..options import LaplacianOptions
+from ..progress import ends_at_one
 from ..types import Array, Bools, Floats, Ints, Progress, Report
 
 _MOST = 20_000  # points of a cloud that are aligned: of more a sample drawn at random, whose errors average out
@@ -73,6 +74,7 @@ class Alignment(NamedTuple):
     notices: list[str]
 
 
+@ends_at_one
 def align(
     points: ArrayLike,
     target: ArrayLike,

@@ -12,6 +12,7 @@ from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import as_mask
 from ..kernel import SECOND_MOMENT
 from ..operator import LaplaceBeltrami, narrow_laplacian
+from ..progress import ends_at_one
 from ..types import Bools, Floats, Ints, Progress
 from .graph import coupled_components, mean_spacing
 
@@ -24,6 +25,7 @@ _LEAST = 2e-3  # share of the wide operator everywhere: it connects what the nar
 _GRAZING = 0.1  # least distance from the edge of a set of fixed points, in spacings
 
 
+@ends_at_one
 def solve_poisson(
     laplacian: LaplaceBeltrami,
     source: ArrayLike,
@@ -129,6 +131,7 @@ def solve_poisson(
     return result
 
 
+@ends_at_one
 def harmonic_field(
     laplacian: LaplaceBeltrami, fixed: ArrayLike, fixed_values: ArrayLike, *, progress: Progress | None = None
 ) -> Floats:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from ..errors import ComponentError, TooFewPointsError
 from ..frozen import Frozen
 from ..options import LaplacianOptions, check_options
+from ..progress import ends_at_one
 from ..types import Bools, Floats, Ints, Progress, Report
 from .agreed import Agreed, Decisions
 from .bandwidth import depth, mean_gaps, smoothing_lengths
@@ -722,6 +723,7 @@ class Discs(Frozen):
         return Discs(normals, self.radii * np.sqrt(longest))
 
 
+@ends_at_one
 def surface_discs(points: ArrayLike, *, progress: Progress | None = None) -> Discs:
     """Find discs that cover the surface, to be drawn: much faster than the operator.
 

@@ -16,6 +16,7 @@ from ..geometry import Agreed, Doubt, arc_length, check_points, check_values, mo
 from ..kernel import SECOND_MOMENT
 from ..memory import check_memory
 from ..options import LaplacianOptions, check_options
+from ..progress import ends_at_one
 from ..types import Bools, Floats, Ints, Progress, Report
 from .areas import NO_AREA, solve_areas
 from .spectrum import TOLERANCE, Spectrum, correct_eigenvalues, solve_spectrum
@@ -240,6 +241,7 @@ class LaplaceBeltrami(Frozen):
             return result
         return result + (SECOND_MOMENT / 8.0) * (self.stiffness @ (widths**2 * result)) / areas
 
+    @ends_at_one
     def eigenpairs(
         self,
         count: int,
@@ -325,6 +327,7 @@ class LaplaceBeltrami(Frozen):
         return Spectrum(correct_eigenvalues(self, values, vectors), vectors, spectrum.residuals)
 
 
+@ends_at_one
 def build_laplacian(
     points: ArrayLike,
     normals: ArrayLike | None = None,
@@ -496,6 +499,7 @@ def laplacian_of(
     )
 
 
+@ends_at_one
 def narrow_laplacian(
     laplacian: LaplaceBeltrami, neighbors: int = NARROW, *, rows: Ints | None = None, progress: Progress | None = None
 ) -> LaplaceBeltrami:

@@ -12,11 +12,13 @@ from ..kernel import pair_kernel
 from ..memory import check_memory
 from ..operator import KernelMatrix, LaplaceBeltrami, Stiffness, laplacian_of, stiffness_matrix
 from ..options import PaperOptions
+from ..progress import ends_at_one
 from ..types import Floats, Progress
 from .areas import AREAS
 from .normals import covariance_normals, tangent_planes
 
 
+@ends_at_one
 def build_laplacian(
     points: ArrayLike,
     *,

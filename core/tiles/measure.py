@@ -12,6 +12,7 @@ from ..frozen import Frozen
 from ..geometry import Agreed
 from ..operator import build_laplacian
 from ..options import LaplacianOptions
+from ..progress import ends_at_one
 from ..types import Bools, Floats, Ints, Progress
 from .cut import Tile
 from .measures import results
@@ -54,6 +55,7 @@ class Measured(Frozen):
     notices: list[str]
 
 
+@ends_at_one
 def measure_tile(
     points: ArrayLike,
     tile: Tile,

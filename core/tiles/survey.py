@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ..files import SCANNER
 from ..geometry import Agreed, check_points
 from ..options import LaplacianOptions, check_options
+from ..progress import ends_at_one
 from ..types import Array, Progress
 from .cut import Tile
 from .seen import checked_viewpoint, orientation
@@ -20,6 +21,7 @@ from .site import Site
 from .steps import agree, part_of, survey_steps, visit
 
 
+@ends_at_one
 def survey(
     points: ArrayLike,
     tiles: Sequence[Tile],

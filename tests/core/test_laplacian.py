@@ -147,4 +147,4 @@ class TestProgress:
         assert list(dict.fromkeys(stage for stage, _ in calls)) == ["Normals", "Neighbors", "Areas", "Operator"]
         fractions = [fraction for _, fraction in calls]
         assert fractions == sorted(fractions)
-        assert 0.0 <= fractions[0] <= fractions[-1] < 1.0
+        assert 0.0 <= fractions[0] < fractions[-1] == 1.0

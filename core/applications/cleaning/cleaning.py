@@ -5,6 +5,7 @@ from scipy import sparse
 
 from ...arguments import check_switches
 from ...operator import LaplaceBeltrami
+from ...progress import ends_at_one
 from ...types import Array, Floats, Ints, Progress
 
 _WIDTH = 0.6  # smoothing lengths of the Gaussian over the distance
@@ -14,6 +15,7 @@ _FARTHEST = 3.0  # times the scatter of heights around: farther off is no noise
 _STEP = 0.7  # of the mean height: less than one, for even samplings
 
 
+@ends_at_one
 def clean_points(
     laplacian: LaplaceBeltrami,
     *,

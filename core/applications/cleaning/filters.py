@@ -21,6 +21,7 @@ from ...errors import PointCloudError
 from ...geometry import check_values
 from ...kernel import SECOND_MOMENT
 from ...operator import LaplaceBeltrami, Spectrum, symmetric_form
+from ...progress import ends_at_one
 from ...types import Floats, Ints, Progress, Response
 
 _DEGREE = 800  # of a polynomial, at most
@@ -220,6 +221,7 @@ def spectral_filter(
     return result.reshape(values.shape)
 
 
+@ends_at_one
 def chebyshev_filter(
     laplacian: LaplaceBeltrami,
     values: ArrayLike,

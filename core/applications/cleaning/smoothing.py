@@ -13,6 +13,7 @@ from ...arguments import check_switches, positive, real, whole
 from ...errors import InvalidPointsError, PointCloudError
 from ...geometry import check_values
 from ...operator import LaplaceBeltrami, Spectrum
+from ...progress import ends_at_one
 from ...types import Floats, Progress, Response
 from .filters import chebyshev_filter, fairing, spectral_filter
 from .sizes import SurfaceSize, match_size
@@ -25,6 +26,7 @@ _EXACT = 1e-8  # error of roughness, as a share of the smoothing length, however
 _AROUND = 4  # neighbours along the boundary that a boundary point is joined to
 
 
+@ends_at_one
 def smooth_points(
     laplacian: LaplaceBeltrami,
     response: int | Response,
@@ -135,6 +137,7 @@ def smooth_points(
     return blend(base + filtered)
 
 
+@ends_at_one
 def fair_points(
     laplacian: LaplaceBeltrami,
     time: float | None = None,
@@ -217,6 +220,7 @@ def fair_points(
     )
 
 
+@ends_at_one
 def roughness(
     laplacian: LaplaceBeltrami, wavelength: float | None = None, *, progress: Progress | None = None
 ) -> Floats:
@@ -335,6 +339,7 @@ def displace_by_mode(
     return points + (most * np.cos(angle)) * (mode / largest)[:, None] * laplacian.normals
 
 
+@ends_at_one
 def smoothing_base(laplacian: LaplaceBeltrami, *, dirichlet: bool = False, progress: Progress | None = None) -> Floats:
     """Return the positions that filters do not change: they filter displacements from these.
 

@@ -16,6 +16,7 @@ from ...geometry import (
     stray_scores,
     without,
 )
+from ...progress import ends_at_one
 from ...types import Bools, Floats, Progress
 
 _SPARSE = 2.0  # times the spacing of the cloud: sparser parts must have more points
@@ -62,6 +63,7 @@ class Strays:
     [800] True 800
     """
 
+    @ends_at_one
     def __init__(self, points: ArrayLike, *, progress: Progress | None = None) -> None:
         report = progress or (lambda stage, fraction: None)
         report("Neighbors", 0.0)
@@ -120,6 +122,7 @@ class Strays:
         return (self.scores * strictness > 1.0) | (small & self._beside)
 
 
+@ends_at_one
 def stray_points(
     points: ArrayLike,
     *,

@@ -10,6 +10,7 @@ from ...arguments import check_switches, real, whole
 from ...cores import cores
 from ...errors import InvalidPointsError, PointCloudError
 from ...geometry import check_points, independent, nearest_in_blocks
+from ...progress import ends_at_one
 from ...types import Bools, Floats, Ints, Progress, Report
 
 _AROUND = 25  # the point itself and its neighbours: more than a pass of twice the distance lets go of
@@ -25,6 +26,7 @@ _TRIALS = 12
 _SEED = 0
 
 
+@ends_at_one
 def thin_out(
     points: ArrayLike,
     *,

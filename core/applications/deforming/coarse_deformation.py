@@ -13,6 +13,7 @@ from ...cores import cores
 from ...errors import PointCloudError
 from ...geometry import balanced_weights, move_apart, nearest_in_blocks, thin
 from ...operator import LaplaceBeltrami, narrow_laplacian
+from ...progress import ends_at_one
 from ...types import Bools, Floats, Ints, Progress
 from ..graph import followers
 from .deformation import (
@@ -83,6 +84,7 @@ class CoarseDeformer(HandleSolver):
     [1. 0.] 0.5
     """
 
+    @ends_at_one
     def __init__(
         self,
         laplacian: LaplaceBeltrami,

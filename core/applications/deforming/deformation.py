@@ -13,6 +13,7 @@ from ...arguments import as_doubles, check_array, check_positions, check_switche
 from ...errors import PointCloudError
 from ...geometry import as_indices
 from ...operator import LaplaceBeltrami, narrow_laplacian
+from ...progress import ends_at_one
 from ...types import Floats, Ints, Progress
 from ..graph import coupled_components, followers
 from .gradients import DeformationGradients, coupled, step_products, sums_over_steps
@@ -58,6 +59,7 @@ class HandleSolver(ABC):
     anchors: Ints
     _chosen: Ints  # rows of handles, then anchors, whose weight is not zero
 
+    @ends_at_one
     def solve(
         self,
         handle_positions: ArrayLike,
@@ -98,6 +100,7 @@ class HandleSolver(ABC):
         """
         return self.deform(handle_positions, steps=steps, rtol=rtol, start=start, progress=progress).points
 
+    @ends_at_one
     def deform(
         self,
         handle_positions: ArrayLike,
@@ -206,6 +209,7 @@ class Deformer(HandleSolver):
     [1. 0.] 0.5
     """
 
+    @ends_at_one
     def __init__(
         self,
         laplacian: LaplaceBeltrami,

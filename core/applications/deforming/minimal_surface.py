@@ -15,6 +15,7 @@ from ...frozen import Frozen
 from ...geometry import FEWEST, as_mask, check_points, find_nearest
 from ...operator import LaplaceBeltrami, build_laplacian
 from ...options import LaplacianOptions, check_options
+from ...progress import ends_at_one
 from ...types import Bools, Floats, Ints, Progress
 from .boundary_curve import BoundaryCurve
 
@@ -67,6 +68,7 @@ class MinimalSurface(Frozen):
     notices: list[str]
 
 
+@ends_at_one
 def minimal_surface(
     points: ArrayLike,
     fixed: ArrayLike,

@@ -15,6 +15,7 @@ from ...arguments import check_switches
 from ...errors import InvalidPointsError
 from ...geometry import as_indices, as_mask, circle_arc, pair_heights
 from ...operator import LaplaceBeltrami
+from ...progress import ends_at_one
 from ...types import Array, Bools, Floats, Ints, Progress
 from .fans import Fans
 
@@ -26,6 +27,7 @@ _DETOUR = 1.25  # shortest path along pairs over the distance, at most
 _FILLED = 1.05  # radii of its cell that a place of the surface is off the nearest point, at most: else it is a gap
 
 
+@ends_at_one
 def geodesic_distance(laplacian: LaplaceBeltrami, sources: ArrayLike, *, progress: Progress | None = None) -> Floats:
     """Measure the distance along the surface from the nearest of some points.
 
@@ -112,12 +114,14 @@ class Geodesics:
     1.6 1.6
     """
 
+    @ends_at_one
     def __init__(self, laplacian: LaplaceBeltrami, *, progress: Progress | None = None) -> None:
         report = progress or (lambda stage, fraction: None)
         self._laplacian = laplacian
         self._graph = _lengths_of_pairs(laplacian, lambda: report("Lengths", 0.0))
         self._fans = Fans(laplacian, self._graph, lambda: report("Lengths", 0.4))
 
+    @ends_at_one
     def distance(self, sources: ArrayLike, *, limit: float = np.inf, progress: Progress | None = None) -> Floats:
         """Measure the distance from the nearest of some points; see `geodesic_distance`.
 
@@ -170,6 +174,7 @@ class Geodesics:
         """
         return self._fans.outward(distance)
 
+    @ends_at_one
     def nearest_source(self, sources: ArrayLike, *, progress: Progress | None = None) -> Ints:
         """Find the nearest of some points; see `nearest_source`.
 
@@ -197,6 +202,7 @@ class Geodesics:
         nearest = self._from(known, progress=progress)[1]
         return label[np.where(nearest < 0, -1, nearest)]
 
+    @ends_at_one
     def signed_distance(self, curve: ArrayLike, closed: bool = False, *, progress: Progress | None = None) -> Floats:
         """Measure the distance from a curve, with a sign; see `signed_distance`.
 
@@ -347,6 +353,7 @@ class Geodesics:
         return band, away[order][first], feet[order][first], left[order][first]
 
 
+@ends_at_one
 def nearest_source(laplacian: LaplaceBeltrami, sources: ArrayLike, *, progress: Progress | None = None) -> Ints:
     """Find the nearest of some points along the surface: geodesic Voronoi cells.
 
@@ -389,6 +396,7 @@ def nearest_source(laplacian: LaplaceBeltrami, sources: ArrayLike, *, progress: 
     return Geodesics(laplacian, progress=progress).nearest_source(sources, progress=progress)
 
 
+@ends_at_one
 def signed_distance(
     laplacian: LaplaceBeltrami, curve: ArrayLike, closed: bool = False, *, progress: Progress | None = None
 ) -> Floats:

@@ -11,6 +11,7 @@ from scipy.linalg import solve_banded
 from ...arguments import as_doubles, check_array, check_finite, whole
 from ...errors import ComponentError, InvalidPointsError
 from ...operator import ImplicitSurface, LaplaceBeltrami
+from ...progress import ends_at_one
 from ...types import Bools, Floats, Ints, Progress
 from .geodesics import Geodesics
 
@@ -22,6 +23,7 @@ _FARTHEST = 1.0  # spacings that a point of the path moves in one round, at most
 _MOST = 20_000  # sides of the polygon
 
 
+@ends_at_one
 def geodesic_path(
     laplacian: LaplaceBeltrami,
     start: int,

@@ -8,6 +8,7 @@ from ...arguments import as_doubles, check_array, check_finite
 from ...errors import InvalidPointsError
 from ...geometry import as_indices
 from ...operator import LaplaceBeltrami, connection_laplacian, tangent_frames
+from ...progress import ends_at_one
 from ...types import Floats, Progress
 from .geodesics import Geodesics
 
@@ -15,6 +16,7 @@ _TIME = 3.0  # smoothing lengths that heat spreads over: fewer do not average ou
 _FARTHEST = 200.0  # extent of the object in such lengths, at most, or the heat there underflows
 
 
+@ends_at_one
 def transport(
     laplacian: LaplaceBeltrami, sources: ArrayLike, directions: ArrayLike, *, progress: Progress | None = None
 ) -> Floats:
@@ -106,6 +108,7 @@ class Transport:
     0.0
     """
 
+    @ends_at_one
     def __init__(self, laplacian: LaplaceBeltrami, *, progress: Progress | None = None) -> None:
         report = progress or _silent
         report("Equations", 0.0)
@@ -123,6 +126,7 @@ class Transport:
         )
         self._flow = TwoGrid(flow, mass, laplacian.points, report)
 
+    @ends_at_one
     def extend(self, sources: ArrayLike, directions: ArrayLike, *, progress: Progress | None = None) -> Floats:
         """Extend directions to all points; see `transport`.
 
@@ -166,6 +170,7 @@ class Transport:
         size = np.abs(found)
         return np.einsum("i,ij->ij", found.conj() / np.where(size > 0.0, size, 1.0), self.frames).real
 
+    @ends_at_one
     def logarithmic_map(
         self,
         source: int,
@@ -213,6 +218,7 @@ class Transport:
         return np.column_stack([position.real, position.imag]) + 0.0  # not -0
 
 
+@ends_at_one
 def logarithmic_map(
     laplacian: LaplaceBeltrami, source: int, direction: ArrayLike | None = None, *, progress: Progress | None = None
 ) -> Floats:

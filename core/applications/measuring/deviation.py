@@ -11,6 +11,7 @@ from ...cores import cores
 from ...errors import PointCloudError
 from ...geometry import Doubt, check_points, check_values, side_sums, sides_by_sums, unit_normals
 from ...operator import ImplicitSurface, LaplaceBeltrami
+from ...progress import ends_at_one
 from ...types import Bools, Floats, Progress, Report
 
 _ROUNDS = 20  # of Newton's method along a normal; a few are needed
@@ -35,6 +36,7 @@ class Deviation(NamedTuple):
     known: Bools
 
 
+@ends_at_one
 def surface_deviation(
     points: ArrayLike,
     normals: ArrayLike | None,

@@ -11,6 +11,7 @@ from ...arguments import check_array
 from ...errors import InvalidPointsError
 from ...frozen import Frozen
 from ...operator import LaplaceBeltrami
+from ...progress import ends_at_one
 from ...types import Bools, Floats, Ints, Progress
 from .regions import LENGTH_OFF, SurfaceMeasures, measure_region
 
@@ -38,6 +39,7 @@ class Parts(Frozen):
     length_uncertainties: Floats
 
 
+@ends_at_one
 def measure_parts(
     laplacian: LaplaceBeltrami, labels: ArrayLike | None = None, *, progress: Progress | None = None
 ) -> Parts:

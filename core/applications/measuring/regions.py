@@ -18,6 +18,7 @@ from ...errors import InvalidPointsError
 from ...frozen import Frozen
 from ...geometry import FEW, SMOOTH, as_mask, move_apart
 from ...operator import LaplaceBeltrami
+from ...progress import ends_at_one
 from ...types import Bools, Floats, Ints, Progress
 from ..graph import mean_spacing
 
@@ -183,6 +184,7 @@ class SurfaceMeasures:
         return rows, level[close], rise / np.maximum(np.linalg.norm(rise, axis=1), 1e-300)[:, None]
 
 
+@ends_at_one
 def measure_region(
     laplacian: LaplaceBeltrami,
     members: ArrayLike,

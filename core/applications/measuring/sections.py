@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from ...arguments import check_plane
 from ...frozen import Frozen
 from ...operator import ImplicitSurface, LaplaceBeltrami
+from ...progress import ends_at_one
 from ...types import Bools, Floats, Progress, Report
 from ..distance.paths import polygon_length
 from ..surfaces.meshing import SurfaceMesh, mesh_surface
@@ -67,6 +68,7 @@ class CrossSection(Frozen):
     notices: list[str]
 
 
+@ends_at_one
 def cross_section(
     laplacian: LaplaceBeltrami,
     point: ArrayLike,

@@ -8,6 +8,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ...frozen import Frozen
 from ...operator import ImplicitSurface, LaplaceBeltrami
+from ...progress import ends_at_one
 from ...types import Array, Bools, Floats, Ints, Progress
 from ..surfaces.meshing import SurfaceMesh, mesh_surface
 
@@ -43,6 +44,7 @@ class EnclosedVolume(Frozen):
     notices: list[str]
 
 
+@ends_at_one
 def enclosed_volume(
     laplacian: LaplaceBeltrami, *, mesh: SurfaceMesh | None = None, progress: Progress | None = None
 ) -> EnclosedVolume:

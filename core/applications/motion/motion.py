@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from ...arguments import not_negative, positive
 from ...geometry import check_values
 from ...operator import LaplaceBeltrami
+from ...progress import ends_at_one
 from ...types import Floats, Progress
 from .propagation import Propagator, read_pair
 
@@ -74,6 +75,7 @@ class Heat:
     0.82 0.82
     """
 
+    @ends_at_one
     def __init__(
         self, laplacian: LaplaceBeltrami, step: float, *, accuracy: float = 0.0, progress: Progress | None = None
     ) -> None:
@@ -81,6 +83,7 @@ class Heat:
         self._propagator = Propagator(laplacian, progress)
         self._spread = self._propagator.heat(time, error)
 
+    @ends_at_one
     def advance(self, state: ArrayLike, *, progress: Progress | None = None) -> Floats:
         """Return the heat one step later.
 
@@ -154,6 +157,7 @@ class Wave:
     0.0
     """
 
+    @ends_at_one
     def __init__(
         self, laplacian: LaplaceBeltrami, step: float, speed: float = 1.0, *, progress: Progress | None = None
     ) -> None:
@@ -162,6 +166,7 @@ class Wave:
         self._propagator = Propagator(laplacian, progress)
         self._swing = self._propagator.wave(self.step, self.speed)
 
+    @ends_at_one
     def advance(self, state: ArrayLike | WaveState, *, progress: Progress | None = None) -> Any:
         """Return the wave one step later.
 

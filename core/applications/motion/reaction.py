@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from ...arguments import not_negative, positive
 from ...errors import InvalidPointsError, PointCloudError
 from ...operator import LaplaceBeltrami
+from ...progress import ends_at_one
 from ...types import Floats, Progress
 from .propagation import Propagator, read_pair
 
@@ -84,6 +85,7 @@ class ReactionDiffusion:
     0.93 0.93 0.0
     """
 
+    @ends_at_one
     def __init__(
         self,
         laplacian: LaplaceBeltrami,
@@ -104,6 +106,7 @@ class ReactionDiffusion:
         self._spread = [self._propagator.heat(time) if time > 0.0 else None for time in spread]
 
     @classmethod
+    @ends_at_one
     def of_pattern(
         cls, laplacian: LaplaceBeltrami, step: float, pattern: str, size: float, *, progress: Progress | None = None
     ) -> ReactionDiffusion:
@@ -133,6 +136,7 @@ class ReactionDiffusion:
         rate = 0.16 * (positive(size, "size") / unit) ** 2
         return cls(laplacian, step, feed, kill, (rate, 0.5 * rate), progress=progress)
 
+    @ends_at_one
     def advance(self, state: ArrayLike | Mixture, *, progress: Progress | None = None) -> Any:
         """Return the concentrations one step later.
 

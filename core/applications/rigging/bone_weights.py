@@ -16,6 +16,7 @@ from ...arguments import as_doubles, check_array, check_finite, check_switches, 
 from ...errors import InvalidPointsError, PointCloudError
 from ...geometry import nearest_rows
 from ...operator import LaplaceBeltrami
+from ...progress import ends_at_one
 from ...types import Bools, Floats, Ints, Progress
 from ..graph import followers
 from .inside import Inside
@@ -32,6 +33,7 @@ _RESOLVED = 3.0  # smoothing lengths, the radius of the kernel: narrower blends 
 _FLOOR = 1e-3  # of the spacing: a bone may pass through a point
 
 
+@ends_at_one
 def bone_weights(
     laplacian: LaplaceBeltrami,
     heads: ArrayLike,

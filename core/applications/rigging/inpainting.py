@@ -15,6 +15,7 @@ from ...arguments import as_doubles, check_array, check_finite, check_switches
 from ...errors import PointCloudError
 from ...geometry import Prolongation, as_indices, blue_noise_subset, move_apart, nearest_rows
 from ...operator import LaplaceBeltrami, narrow_laplacian
+from ...progress import ends_at_one
 from ...types import Array, Bools, Floats, Ints, Progress
 from ..graph import followers
 from .touching import apart, outward_normals
@@ -22,6 +23,7 @@ from .touching import apart, outward_normals
 _MOST = 10_000  # points that are solved on within two seconds; of more unknown ones, so many of all are
 
 
+@ends_at_one
 def inpaint(
     laplacian: LaplaceBeltrami,
     known: ArrayLike,

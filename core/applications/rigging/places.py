@@ -17,6 +17,7 @@ from ...errors import InvalidPointsError, PointCloudError
 from ...frozen import Frozen
 from ...geometry import COUNT, SMOOTH, as_mask, balanced_weights, find_nearest, frames
 from ...operator import LaplaceBeltrami
+from ...progress import ends_at_one
 from ...types import Bools, Floats, Ints, Progress, Report
 from .touching import apart, outward_normals
 
@@ -56,6 +57,7 @@ class SurfaceMatch(Frozen):
     limit: float
 
 
+@ends_at_one
 def match_surface(
     target: LaplaceBeltrami,
     sources: LaplaceBeltrami | Sequence[LaplaceBeltrami],

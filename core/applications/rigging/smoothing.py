@@ -13,6 +13,7 @@ from ...arguments import as_doubles, check_array, check_finite, check_switches, 
 from ...errors import InvalidPointsError, PointCloudError
 from ...geometry import as_mask
 from ...operator import LaplaceBeltrami
+from ...progress import ends_at_one
 from ...types import Bools, Floats, Progress
 from ..motion.motion import Heat
 from .bone_weights import strongest
@@ -23,6 +24,7 @@ _ACCURACY = 1e-6  # of weights
 _HELD = 1e12  # times as much heat as others hold points whose weights stay
 
 
+@ends_at_one
 def smooth_weights(
     laplacian: LaplaceBeltrami,
     weights: ArrayLike,

@@ -8,11 +8,13 @@ from numpy.typing import ArrayLike
 from ...arguments import as_doubles, check_array, check_finite
 from ...errors import InvalidPointsError, PointCloudError
 from ...operator import LaplaceBeltrami
+from ...progress import ends_at_one
 from ...types import Array, Floats, Progress
 from .inpainting import inpaint, inpaint_labels
 from .places import SurfaceMatch
 
 
+@ends_at_one
 def transfer_values(
     target: LaplaceBeltrami, match: SurfaceMatch, values: ArrayLike, *, progress: Progress | None = None
 ) -> Floats:

@@ -10,6 +10,7 @@ from ...errors import ComponentError, InvalidPointsError, PointCloudError, TooFe
 from ...geometry import check_values
 from ...kernel import RESOLVED
 from ...operator import LaplaceBeltrami, Spectrum
+from ...progress import ends_at_one
 from ...types import Array, Floats, Ints, Progress
 from ..graph import NearGraph, near_graph
 
@@ -104,6 +105,7 @@ def nodal_domains(
     return _by_size(graph, domain, values)
 
 
+@ends_at_one
 def segment(
     laplacian: LaplaceBeltrami, parts: int, *, spectrum: Spectrum | None = None, progress: Progress | None = None
 ) -> Ints:

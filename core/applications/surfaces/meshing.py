@@ -17,6 +17,7 @@ from ...frozen import Frozen
 from ...geometry import Prolongation, check_points
 from ...memory import available_memory
 from ...operator import ImplicitSurface, LaplaceBeltrami
+from ...progress import ends_at_one
 from ...types import Array, Bools, Floats, Ints, Progress
 from .grid import Grid, Levels, count_corners, grid_around, octaves_of
 from .quads import all_quads
@@ -55,6 +56,7 @@ class SurfaceMesh(Frozen):
         return iter((self.vertices, self.faces))
 
 
+@ends_at_one
 def mesh_surface(laplacian: LaplaceBeltrami, detail: float = 1.0, *, progress: Progress | None = None) -> SurfaceMesh:
     """Make a mesh of the surface that the points lie on.
 
