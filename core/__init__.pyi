@@ -138,6 +138,8 @@ from .options import LaplacianOptions as LaplacianOptions
 from .options import PaperOptions as PaperOptions
 from .paper import Stability as Stability
 from .paper import check_stability as check_stability
+from .saving import load as load
+from .saving import save as save
 from .splats import Splats as Splats
 from .splats import floaters as floaters
 from .splats import read_splats as read_splats

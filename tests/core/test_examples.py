@@ -11,7 +11,7 @@ import core
 WITHOUT = {  # functions whose examples are those of what they go with, or which need a file
     *("band", "boost", "exponential", "fairing", "chebyshev_filter", "check_points", "coarse_deformer", "floaters"),
     *("modes_needed", "points_that_fit", "signature_energies", "signature_times", "smoothing_base", "values_on_mesh"),
-    *("read_splats", "write_splats"),
+    *("load", "read_splats", "write_splats"),
 }
 CLASSES = {"Agreed", "CoarseDeformer", "Deformer", "Doubt", "Geodesics", "LaplacianOptions", "Prolongation", "Slopes"}
 CLASSES |= {"Heat", "ReactionDiffusion", "Skinner", "Strays", "SurfaceMeasures", "Transport", "Wave"}
