@@ -130,7 +130,9 @@ from .operator import MeanCurvature as MeanCurvature
 from .operator import PrincipalCurvatures as PrincipalCurvatures
 from .operator import Spectrum as Spectrum
 from .operator import build_laplacian as build_laplacian
+from .operator import divergence_matrix as divergence_matrix
 from .operator import estimate_areas as estimate_areas
+from .operator import gradient_matrix as gradient_matrix
 from .operator import mean_curvature as mean_curvature
 from .operator import measure_mean_curvature as measure_mean_curvature
 from .operator import principal_curvatures as principal_curvatures
