@@ -71,7 +71,4 @@ def _import(name: str) -> ModuleType:
     except ImportError as error:
         if (error.name or "").startswith(__name__):
             raise
-        raise BrokenLibraryError(
-            f"The scipy of this Python does not serve: {error}. In Blender, disable the extension that brings another"
-            " one, or install this one again; then restart."
-        ) from error
+        raise BrokenLibraryError(f"The scipy of this Python does not serve: {error}. Install one that fits.") from error

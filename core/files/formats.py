@@ -106,7 +106,7 @@ def read_points(path: FilePath, columns: str = "", las: LasChoices = LasChoices(
 def check_columns(path: Path, columns: str) -> None:
     """Refuse names of columns for a file that is not of one of the kinds in `TEXTS`."""
     if columns.strip() and path.suffix.lower() not in TEXTS:
-        raise PointCloudError(f"{path} names its columns itself. Give Columns only with {', '.join(TEXTS)}.")
+        raise PointCloudError(f"{path} names its columns itself. Give columns only with {', '.join(TEXTS)}.")
 
 
 def doubts(table: PointTable, path: FilePath) -> Iterator[str]:

@@ -281,7 +281,7 @@ class Tally:
 
     @property
     def _withheld_text(self) -> str:
-        return f"{self._withheld} withheld points, which means deleted. Withheld Points keeps them."
+        return f"{self._withheld} withheld points, which means deleted. LasChoices.withheld keeps them."
 
     def refuse_none(self, path: Path) -> None:
         """Refuse a file of whose points none is left."""

@@ -11,7 +11,7 @@ from .lines import brief, is_number
 from .names import Places, find_places, is_other
 
 _SKIPPED, _REST = "-", "..."  # among names that a user gives
-_GIVE = "If that is wrong, give the names of all columns in Columns at the import"
+_GIVE = "If that is wrong, give the names of all columns by columns"
 _MOST_DIGITS = 15  # of a number of points
 _UNIT = 1.02  # to which numbers of unit vectors, rounded to a few digits, go
 
@@ -161,8 +161,8 @@ def _refuse_others(names: Sequence[str | None], path: Path) -> None:
     given = [name for name in names if name]
     if any(map(is_other, given)):
         raise InvalidPointsError(
-            f"{path} has no x y z among its columns {brief(', '.join(given))}. Give the names of all columns in Columns"
-            " at the import, with x y z among them."
+            f"{path} has no x y z among its columns {brief(', '.join(given))}. Give the names of all columns by"
+            " columns, with x y z among them."
         )
 
 

@@ -107,14 +107,15 @@ class Reference(NamedTuple):
             yield f"{path.name}: x and y are in {plane}, heights in {heights}" + (
                 _CONVERTED
                 if converted
-                else ", so the surface is distorted, and areas and curvatures are wrong. Convert to Meters mends it."
+                else ", so the surface is distorted, and areas and curvatures are wrong. LasChoices.meters converts"
+                " them."
             )
         elif not plane.is_like(1.0):
             yield f"{path.name}: coordinates are in {plane}" + (
                 _CONVERTED
                 if converted
-                else ", and so are lengths and areas, though Blender shows meters. Convert to Meters, or set Unit Scale"
-                f" in the properties of the scene to {plane.meters:.9g}."
+                else f", and so are lengths and areas. LasChoices.meters converts them; in meters one is"
+                f" {plane.meters:.9g}."
             )
 
 

@@ -174,7 +174,7 @@ def _guess_notice(path: Path, places: list[int], labels: list[str], names: list[
     others = "; ".join(f"{', '.join(found)} as {kind}" for kind, found in groups if found)
     return (
         f"{path.name}: not all columns have names. Read {', '.join(f'column_{i + 1}' for i in places)} as x y z;"
-        f" {others}. If that is wrong, give their names in Columns at the import."
+        f" {others}. If that is wrong, give their names by columns."
     )
 
 

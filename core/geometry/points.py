@@ -47,7 +47,7 @@ def check_points(points: ArrayLike) -> Floats:
     if given.dtype.kind not in "iuf":
         raise InvalidPointsError(f"Points must be real numbers, not {given.dtype}. Convert them to float64.")
     if len(given) == 0:
-        raise TooFewPointsError("There are no points. Add points, or choose another object.")
+        raise TooFewPointsError("There are no points. Add points.")
     result = as_doubles(given, copy=False)
     check_finite(result, "points", "Delete these points.")
     largest = np.abs(result).max()

@@ -136,7 +136,7 @@ def _notices(laplacian: LaplaceBeltrami, averages: Averages, size: Floats, scatt
     share = np.count_nonzero(decided) / np.count_nonzero(known)
     return [
         f"Noise decides the {what}: at {share:.0%} of the points values are less than twice what noise leaves in them."
-        " The surface may be flat; if not, a greater Bandwidth Factor averages over more points."
+        " The surface may be flat; if not, a greater bandwidth_factor averages over more points."
     ]
 
 

@@ -49,6 +49,6 @@ def doubt_notices(doubt: Ints, areas: Floats) -> list[str]:
         return []
     share = "" if shares[largest] > 0.9 * doubtful else f", on {shares[largest]:.0%}"
     return [
-        f"On {doubtful:.0%} of the surface the results are in doubt{share} since {_CAUSES[largest]} The attribute"
-        " lb_doubt shows where, and why."
+        f"On {doubtful:.0%} of the surface the results are in doubt{share} since {_CAUSES[largest]}"
+        " LaplaceBeltrami.doubt tells where, and why."
     ]

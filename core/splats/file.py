@@ -171,7 +171,7 @@ def _read_ply(path: Path) -> PlyVertices:
     """Read a PLY file as columns of trainers."""
     vertices = read_vertex_columns(path)
     columns, guesses = completed(vertices.columns)
-    notices = [f"{path.name}: {'; '.join(guesses)}. Export Splats writes the common layout."] if guesses else []
+    notices = [f"{path.name}: {'; '.join(guesses)}. write_splats writes the common layout."] if guesses else []
     notices += [f"{path.name}: {text}" for text in remarks(list(vertices.columns))]
     return vertices._replace(columns=columns, notices=[*vertices.notices, *notices])
 

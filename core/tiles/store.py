@@ -58,7 +58,7 @@ class Store:
             raise PointCloudError(f"{folder} holds no tiles: {error}. Cut a cloud into it first.") from error
         if self.manifest.get("version") != VERSION:
             raise PointCloudError(
-                f"{folder} was written by another version of the extension. Cut the cloud into a new folder."
+                f"{folder} was written by another version of this package. Cut the cloud into a new folder."
             )
         agreed: dict[str, Any] = {name: np.asarray(value) for name, value in self.manifest["agreed"].items()}
         self._start, self.record = agreed, agreed

@@ -4,6 +4,7 @@ import bpy
 from bpy.props import EnumProperty, StringProperty
 
 from ..registration import Registration, Row
+from .words import in_blender
 
 
 class MESHFREE_PG_notice(bpy.types.PropertyGroup):
@@ -24,7 +25,7 @@ class MESHFREE_PG_notice(bpy.types.PropertyGroup):
 
 def keep(obj, tool: str, text: str, level: str = "WARNING"):
     """Keep a notice of a tool on an object, in place of the same one of another tool."""
-    notices = obj.meshfree.notices
+    notices, text = obj.meshfree.notices, in_blender(text)
     _remove(notices, lambda kept: kept.text == text)
     kept = notices.add()
     kept.tool, kept.text, kept.level = tool, text, level

@@ -7,6 +7,7 @@ from numpy.linalg import LinAlgError
 from ...core import PointCloudError
 from ..objects.notices import forget, keep
 from ..objects.reading import obstacle, sharing_objects
+from ..objects.words import in_blender
 
 _TEXTS = {  # errors that any computation may raise, and what to report
     PointCloudError: "{}",
@@ -19,7 +20,7 @@ TROUBLES = tuple(_TEXTS)
 
 def error_text(error) -> str:
     """Return the text that reports one of the `TROUBLES`."""
-    return next(text for kind, text in _TEXTS.items() if isinstance(error, kind)).format(error)
+    return next(text for kind, text in _TEXTS.items() if isinstance(error, kind)).format(in_blender(str(error)))
 
 
 def reporting(method):
@@ -51,7 +52,7 @@ class NoticeOperator:
         self._keep("INFO", text, objects)
 
     def _keep(self, level, text, objects):
-        self.report({level}, text)
+        self.report({level}, in_blender(text))
         for owner in _owners(objects):
             keep(owner, self.bl_label, text, level)
 

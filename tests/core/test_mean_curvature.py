@@ -163,7 +163,7 @@ class TestNotices:
         for found in (core.measure_mean_curvature(laplacian), core.principal_curvatures(laplacian)):
             [notice] = found.notices
             assert notice.startswith("Noise decides the ")
-            assert "Bandwidth Factor" in notice
+            assert "bandwidth_factor" in notice
 
     def test_nothing_does_on_an_exact_one(self):
         laplacian = core.build_laplacian(self.plate(0.0))

@@ -35,7 +35,7 @@ SYSTEMS = {
         plane('UNIT["Foot",0.3048]'),
         0.3048,
         0.3048,
-        "Unit Scale in the properties of the scene to 0.3048.",
+        "LasChoices.meters converts them; in meters one is 0.3048.",
     ),
     "ESRI": (plane('UNIT["Foot_US",0.3048006096012192]'), SURVEY_FOOT, SURVEY_FOOT, "US survey feet"),
     "other": (plane('UNIT["Yard",0.9144]'), 0.9144, 0.9144, 'units "Yard"'),

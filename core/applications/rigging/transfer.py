@@ -123,8 +123,8 @@ def _checked(target: LaplaceBeltrami, match: SurfaceMatch, values: ArrayLike, na
         )
     if not match.known.any():
         raise PointCloudError(
-            f"No point lies within {match.limit:.3g} of the surface of the source, with normals that agree. Move the"
-            " objects onto each other, or raise the distance or the angle."
+            f"No point lies within {match.limit:.3g} of the surface of the source, with normals that agree. Move one"
+            " onto the other, or raise the distance or the angle."
         )
     count = match.weights.shape[1]
     shapes: list[tuple[int | None, ...]] = [(count,), (count, None)]
