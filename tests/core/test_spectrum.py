@@ -157,7 +157,8 @@ def test_progress_is_reported(laplacian):
     calls = []
     laplacian.eigenpairs(5, progress=lambda stage, fraction: calls.append((stage, fraction)))
     assert {stage for stage, _ in calls} == {"Spectrum"}
-    assert all(0.0 <= fraction < 1.0 for _, fraction in calls)
+    assert all(0.0 <= fraction < 1.0 for _, fraction in calls[:-1])
+    assert calls[-1] == ("Spectrum", 1.0)
 
 
 def test_a_small_dense_part_beside_a_large_one():
