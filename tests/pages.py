@@ -12,6 +12,7 @@ _INLINE = re.compile(r"(?<!`)`([^`\n]+)`(?!`)")
 _SHELL = r"(?:[A-Z_]+=\S+ )*(make|blender|python|pip|meshfree|openjd|bash) \S.*"
 _TYPED = re.compile(rf"{_SHELL}|bpy\.ops\.\w+\..*")
 
+WHEEL = "https://server/meshfree_laplacian-1.2.3-py3-none-any.whl"
 FARM = "needs a scheduler; tests/wheel/test_farm.py runs it on other files"
 SERVER = "needs a server; tests/gui/test_repository.py runs it with one"
 DASK = "needs a cluster; tests/wheel/test_scale.py runs it on workers of its own"
@@ -27,7 +28,9 @@ NOT_RUN = {
     "blender --online-mode --command extension repo-add --name Studio --url https://server/index.json studio": SERVER,
     "blender --online-mode --command extension install --sync --enable studio.meshfree_laplacian": SERVER,
     "blender --online-mode --command extension update --sync": SERVER,
-    "pip install meshfree-laplacian[scale]": "changes the environment, from the internet",
+    f'pip install "meshfree-laplacian[scale] @ {WHEEL}"': "changes the environment, from the internet",
+    f'pip install "meshfree-laplacian[files] @ {WHEEL}"': "changes the environment, from the internet",
+    "python -m meshfree_laplacian": "another name of a program; tests/wheel/test_wheel.py runs it",
     "meshfree tiles run scans --out-dir out --workers 8 --memory 4GB": DASK,
     "meshfree tiles run scans --out-dir out --scheduler tcp://head:8786 --memory 4GB": DASK,
     "pip install laspy lazrs": "changes the environment, from the internet",
@@ -93,12 +96,12 @@ def _lines(commands):
 
 
 def _kind(text):
-    """What is typed: a program of a shell, json, or Python with core, the wheel, or bpy."""
+    """What is typed: a program of a shell, json, or Python with core, with what the wheel's environment has, or bpy."""
     command = re.match(_SHELL, text)
     if command:
         return command[1]
     if text.startswith("{"):
         return "json"
-    if re.search(r"^(from|import) meshfree_laplacian\b", text, re.MULTILINE):
+    if re.search(r"^(from|import) matplotlib\b", text, re.MULTILINE):
         return "wheel"
-    return "core" if re.search(r"^(from|import) core\b", text, re.MULTILINE) else "bpy"
+    return "core" if re.search(r"^(from|import) (core|meshfree_laplacian)\b", text, re.MULTILINE) else "bpy"

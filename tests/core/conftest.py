@@ -20,6 +20,9 @@ from benchmarks.samplings import (
 )
 from command import verbs
 from command.main import run as run_command
+from tests.wheel_name import put_in_place
+
+put_in_place()
 
 CLOUDS = {
     "even sphere": lambda: fibonacci_sphere(2500),

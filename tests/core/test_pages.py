@@ -39,6 +39,25 @@ def test_code(snippet, tmp_path, monkeypatch):
     exec(compile(snippet.text, snippet.id, "exec"), {"points": points, "values": points[:, 2], "np": np})
 
 
+def test_scipy_finds_the_modes_of_the_operator(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    [recipe] = [one for one in snippets("core") if "eigsh(" in one.text]
+    found = {"points": np.vstack([fibonacci_sphere(800), [[5.0, 0.0, 0.0]]])}
+    exec(compile(recipe.text, recipe.id, "exec"), found)
+    assert not found["known"][-1]
+    raw = found["laplacian"].eigenpairs(10, raw=True)
+    np.testing.assert_allclose(found["eigenvalues"], raw.eigenvalues, rtol=1e-8, atol=1e-8)
+    mass = found["eigenvectors"].T @ found["M"] @ found["eigenvectors"]
+    np.testing.assert_allclose(mass, np.eye(10), atol=1e-8)
+
+
+def test_no_page_installs_a_name_that_is_not_published():
+    """But from the address of a wheel."""
+    told = [one.text for one in typed() if "pip" in one.text and re.search(r"meshfree[-_]laplacian", one.text)]
+    assert told
+    assert [text for text in told if not re.search(r"meshfree-laplacian(\[\w+\])? @ https://\S+\.whl\"", text)] == []
+
+
 @by_name("meshfree")
 def test_program(snippet, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
