@@ -194,7 +194,8 @@ def _symmetric(scaled: ScaledPoints, first: Ints, second: Ints, values: Floats, 
         row = scaled.inverse[known]
         spread = sparse.csr_array((1.0 / scaled.copies[row], (known, row)), shape=(n, m))
         half = sparse.csr_array((values, (first, second)), shape=(m, m))
-        return (spread @ (half + half.T + sparse.diags_array(own)) @ spread.T).tocsr()
+        alone = sparse.diags_array(own, dtype=np.float64)  # numpy counts nothing, without weights, in whole numbers
+        return (spread @ (half + half.T + alone) @ spread.T).tocsr()
     caller = scaled.first.astype(np.int32)
     ends = (np.concatenate([caller[end], caller]) for end in (first, second))
     half = sparse.csr_array((np.concatenate([values, 0.5 * own]), tuple(ends)), shape=(n, n))
