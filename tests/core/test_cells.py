@@ -104,7 +104,7 @@ def test_a_point_that_no_neighbor_cuts_has_no_closed_cell():
 def test_trust_is_low_where_the_points_do_not_tell():
     sphere = core.build_laplacian(random_sphere(1000))
     assert sphere.trust.min() > 0.9
-    assert not any("lb_doubt" in notice for notice in sphere.notices)
+    assert not any("LaplaceBeltrami.doubt" in notice for notice in sphere.notices)
     # A bar so thin that the neighbors of most points lie on several of its sides.
     bar = np.random.default_rng(0).uniform(0.0, 1.0, (600, 3))
     bar[np.arange(600), 1 + np.arange(600) % 2] = np.arange(600) // 2 % 2
@@ -112,7 +112,7 @@ def test_trust_is_low_where_the_points_do_not_tell():
     known = laplacian.component >= 0
     assert np.average(laplacian.trust[known], weights=laplacian.areas[known]) < 0.8
     assert np.all(laplacian.trust[~known] == 0.0)
-    assert any("lb_doubt" in notice for notice in laplacian.notices)
+    assert any("LaplaceBeltrami.doubt" in notice for notice in laplacian.notices)
 
 
 def test_measured_alone():

@@ -54,7 +54,7 @@ def test_the_cause_of_a_cloud_is_that_of_most_doubts(told):
 
 def test_one_notice_names_it(told):
     cause, laplacian = told
-    (notice,) = [notice for notice in laplacian.notices if "lb_doubt" in notice]
+    (notice,) = [notice for notice in laplacian.notices if "LaplaceBeltrami.doubt" in notice]
     assert [other for other, text in SAID.items() if text in notice] == [cause]
 
 
@@ -84,7 +84,7 @@ def test_the_cause_moves_with_the_points(told, turned):
 def test_clean_clouds_have_no_doubts(points):
     laplacian = core.build_laplacian(points)
     assert not laplacian.doubt.any()
-    assert not any("lb_doubt" in notice for notice in laplacian.notices)
+    assert not any("LaplaceBeltrami.doubt" in notice for notice in laplacian.notices)
 
 
 def test_an_outlier_is_in_doubt_as_it_is_left_out():
@@ -98,7 +98,7 @@ def test_a_small_cause_is_named_with_its_own_share():
     bar = box([1.0, 0.2, 0.2], 300) + [3.0, 0.0, 0.0]
     laplacian = core.build_laplacian(np.concatenate([ball(), bar]))
     shares = np.bincount(laplacian.doubt, laplacian.areas, len(Doubt)) / laplacian.areas.sum()
-    (notice,) = [notice for notice in laplacian.notices if "lb_doubt" in notice]
+    (notice,) = [notice for notice in laplacian.notices if "LaplaceBeltrami.doubt" in notice]
     assert shares[Doubt.FEW] > 0.005
     assert SAID[Doubt.VOLUME] in notice
 
@@ -107,7 +107,7 @@ def test_a_width_of_the_callers_choice_is_not_blamed():
     options = core.LaplacianOptions(bandwidth="local", neighbors=40, bandwidth_factor=0.4)
     laplacian = core.build_laplacian(ball(), options=options)
     assert laplacian.doubt.any()
-    assert not any("lb_doubt" in notice for notice in laplacian.notices)
+    assert not any("LaplaceBeltrami.doubt" in notice for notice in laplacian.notices)
 
 
 @pytest.mark.parametrize(("across", "cause"), [(1.0, Doubt.FEW), (8.0, Doubt.ROWS)])
