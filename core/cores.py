@@ -2,12 +2,13 @@
 
 import math
 import os
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from .control_groups import groups_of, number_in
 from .errors import PointCloudError
 
 VARIABLE = "MESHFREE_CORES"
-_CGROUP = Path("/sys/fs/cgroup")
 
 
 def cores() -> int:
@@ -26,13 +27,15 @@ def cores() -> int:
             raise PointCloudError(f"{VARIABLE} is {text!r}. Let it be a whole number of at least 1, or remove it.")
         return int(text)
     given = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return min(given, _container_cores() or given)
+    return min([given, *_group_cores(groups_of("cpu"))])
 
 
-def _container_cores(root: Path = _CGROUP) -> int | None:
-    """Return the limit of a container, rounded up, None without one."""
-    limit = root / "cpu.max"
-    if not limit.exists():
-        return None
-    quota, period = limit.read_text().split()
-    return None if quota == "max" else max(math.ceil(int(quota) / int(period)), 1)
+def _group_cores(groups: Iterable[Path]) -> Iterator[int]:
+    """Yield the limit of each control group that has one, rounded up."""
+    for group in groups:
+        if (group / "cpu.max").exists():  # of version 2
+            quota, _, period = (group / "cpu.max").read_text(encoding="utf-8").partition(" ")
+        else:
+            quota, period = (str(number_in(group / f"cpu.cfs_{name}_us") or "") for name in ("quota", "period"))
+        if quota.isdecimal() and int(period) > 0:
+            yield max(math.ceil(int(quota) / int(period)), 1)

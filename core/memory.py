@@ -3,8 +3,10 @@
 import ctypes
 import os
 import sys
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from .control_groups import groups_of, number_in
 from .errors import NotEnoughMemoryError
 from .options import LaplacianOptions
 
@@ -16,7 +18,11 @@ _ALONE = 43  # neighbours that would take as much as what each point needs for i
 _PER_MODE = 70  # bytes a point for each mode beyond that: 50 and 400 modes took 3.4 and 28 kB a point
 ADAPTIVE = 60.0  # neighbours in "adaptive" kernels on random points, which have the most
 _SHARE = 0.8  # of the free memory, to leave some for other programs
-_CGROUP = Path("/sys/fs/cgroup")
+# Files of a control group, of versions 2 and 1: the limit, what is taken, and which of that are cached files.
+_GROUPS = (
+    ("memory.max", "memory.current", "inactive_file"),
+    ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
+)
 
 
 def needed_memory(count: int, options: LaplacianOptions, modes: int = 0) -> int:
@@ -126,8 +132,8 @@ def available_memory() -> int | None:
         return _windows_memory()
     if sys.platform == "darwin":  # it calls memory used that it gives at once when asked: half of all is taken as free
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
-    known = [free for free in (_linux_memory(), _container_memory()) if free is not None]
-    return min(known, default=None)
+    known = [_linux_memory(), *_group_memory(groups_of("memory"))]
+    return min((free for free in known if free is not None), default=None)
 
 
 def _linux_memory(path: Path = Path("/proc/meminfo")) -> int | None:
@@ -136,13 +142,15 @@ def _linux_memory(path: Path = Path("/proc/meminfo")) -> int | None:
     return 1024 * _numbers(path.read_text()).get("MemAvailable:", 0) or None
 
 
-def _container_memory(root: Path = _CGROUP) -> int | None:
-    """Return the memory below the limit of a container, None without one; cached files count as free."""
-    limit, used, kinds = (root / name for name in ("memory.max", "memory.current", "memory.stat"))
-    if not (limit.exists() and used.exists() and kinds.exists()) or limit.read_text().strip() == "max":
-        return None
-    cached = _numbers(kinds.read_text()).get("inactive_file", 0)
-    return max(int(limit.read_text()) - int(used.read_text()) + cached, 0)
+def _group_memory(groups: Iterable[Path]) -> Iterator[int]:
+    """Yield the memory below the limit of each control group that has one; cached files count as free."""
+    for group in groups:
+        for limit, used, cached in _GROUPS:
+            most, taken = number_in(group / limit), number_in(group / used)
+            if most is not None and taken is not None:
+                kinds = group / "memory.stat"
+                given_back = _numbers(kinds.read_text()).get(cached, 0) if kinds.exists() else 0
+                yield max(most - taken + given_back, 0)
 
 
 def _numbers(text: str) -> dict[str, int]:

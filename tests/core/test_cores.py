@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import core
-from core.cores import VARIABLE, _container_cores, cores
+from core.cores import VARIABLE, cores
 
 ROOT = Path(__file__).parents[2]
 
@@ -45,15 +45,6 @@ def test_a_variable_that_is_no_number_is_told(monkeypatch, text):
     monkeypatch.setenv(VARIABLE, text)
     with pytest.raises(core.PointCloudError, match=f"{VARIABLE} is '{text}'. Let it be a whole number"):
         core.build_laplacian(core.example_sphere())
-
-
-@pytest.mark.parametrize(
-    ("limit", "count"), [("max 100000", None), ("200000 100000", 2), ("150000 100000", 2), ("5000 100000", 1)]
-)
-def test_those_of_a_container(tmp_path, limit, count):
-    assert _container_cores(tmp_path) is None
-    (tmp_path / "cpu.max").write_text(f"{limit}\n")
-    assert _container_cores(tmp_path) == count
 
 
 def test_nothing_counts_for_itself():

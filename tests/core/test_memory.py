@@ -66,14 +66,3 @@ def test_linux(tmp_path):
     known.write_text("MemTotal:  2000 kB\nMemAvailable:   1000 kB\nHugePages_Total:       0\n")
     assert memory._linux_memory(known) == 1_024_000
     assert memory._linux_memory(tmp_path / "none") is None
-
-
-@pytest.mark.parametrize(("limit", "expected"), [("1000", 700), ("max", None), ("100", 0)])
-def test_container(tmp_path, limit, expected):
-    for name, text in (("max", limit), ("current", "400"), ("stat", "anon 300\ninactive_file 100")):
-        (tmp_path / f"memory.{name}").write_text(f"{text}\n")
-    assert memory._container_memory(tmp_path) == expected
-
-
-def test_no_container(tmp_path):
-    assert memory._container_memory(tmp_path) is None
