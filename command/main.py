@@ -12,7 +12,7 @@ from .records import Records, add_report, check_report
 from .verbs import make_verbs
 
 DONE, FAILED, WRONG_USAGE, ELSEWHERE, STOPPED = 0, 1, 2, 3, 130  # exit codes
-_SCARCE = {errno.ENOMEM, errno.ENOSPC, errno.EDQUOT}  # of errors that another machine may not have
+_SCARCE = {errno.ENOMEM, errno.ENOSPC, errno.EDQUOT, errno.EFBIG}  # of errors that another machine may not have
 
 
 def main() -> int:

@@ -47,4 +47,6 @@ from .table import check_places as check_places
 from .table import full_color as full_color
 from .table import split_columns as split_columns
 from .table import unit_colors as unit_colors
+from .whole import holding as holding
 from .whole import replacing as replacing
+from .whole import writing as writing

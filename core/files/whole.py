@@ -1,20 +1,33 @@
-"""Files written completely or not at all."""
+"""Files written completely or not at all, by one process at a time."""
 
+import errno
 import os
+import re
+import secrets
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..arguments import as_path
 from ..errors import PointCloudError
 from ..types import FilePath
 
+try:
+    import fcntl
+except ImportError:  # in Windows, where files that are open cannot be deleted
+    fcntl = None  # type: ignore[assignment]
+
+_LONGEST = 200  # bytes of a name, to which those of a part are added
+_PART = re.compile(r"\..*\.\d+-[0-9a-f]{8}\.part(\.[^.]*)?")
+_cleaned = set[Path]()  # folders
+
 
 @contextmanager
 def replacing(path: FilePath) -> Iterator[Path]:
     """Provide a temporary file beside this one to write to, which replaces it at the end.
 
-    If writing fails, an older file stays. The folder is created if it is missing.
+    If writing fails, an older file stays. The folder is created if it is missing. Of several processes that write the
+    same file each has a temporary one of its own, and the last one to end replaces those of the others.
 
     Parameters
     ----------
@@ -31,14 +44,104 @@ def replacing(path: FilePath) -> Iterator[Path]:
         The file or its folder cannot be written to.
     """
     path = as_path(path)
-    temporary = path.with_name(f".{path.stem}.part{path.suffix}")
-    try:
+    stem = os.fsdecode(os.fsencode(path.stem)[:_LONGEST])
+    temporary = path.with_name(f".{stem}.{os.getpid()}-{secrets.token_hex(4)}.part{path.suffix}")
+    with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        temporary.unlink(missing_ok=True)  # of a writer that was killed; a link there would lead elsewhere
-        try:
+        _clean(path.parent)
+        with holding(temporary):
             yield temporary
             os.replace(temporary, path)
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Convert errors while a file or folder is written into typed ones that name it.
+
+    Raises
+    ------
+    PointCloudError
+        It cannot be written. The cause tells the number of the error, and that of a write that fell short is the one of
+        a full disk: numpy and lazrs tell none.
+    """
+    try:
+        yield
+    except BrokenPipeError:  # of what is printed meanwhile
+        raise
+    except (OSError, RuntimeError) as error:
+        if isinstance(error, RuntimeError) and type(error).__module__ != "lazrs":
+            raise
+        known = error if isinstance(error, OSError) and error.errno else _full()
+        raise PointCloudError(f"{path} cannot be written: {known.strerror}. Choose another place.") from known
+
+
+def _full() -> OSError:
+    return OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+@contextmanager
+def holding(path: Path) -> Iterator[bool]:
+    """Hold a file for this process, made if it is missing, and delete it at the end.
+
+    Yields
+    ------
+    bool
+        False if another process holds it, which then goes on to. A process that is killed holds nothing any more. Where
+        files cannot be locked, as in Windows and on some network drives, each process is told that it holds it.
+    """
+    if fcntl is None:
+        try:
+            yield True
         finally:
-            temporary.unlink(missing_ok=True)
-    except OSError as error:
-        raise PointCloudError(f"{path} cannot be written: {error.strerror or error}. Choose another place.") from error
+            path.unlink(missing_ok=True)
+        return
+    file = _open(path)
+    try:
+        while (free := _lock(file) is not False) and not _is_at(file, path):  # another one has deleted it at its end
+            os.close(file)
+            file = _open(path)
+        try:
+            yield free
+        finally:
+            if free:
+                path.unlink(missing_ok=True)
+    finally:
+        os.close(file)
+
+
+def _open(path: Path) -> int:
+    return os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
+
+
+def _lock(file: int) -> bool | None:
+    """Lock an open file and tell whether that went well; False if another process has, None if that is not known."""
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return None
+    return True
+
+
+def _is_at(file: int, path: Path) -> bool:
+    try:
+        return os.path.samestat(os.fstat(file), os.stat(path))
+    except FileNotFoundError:
+        return False
+
+
+def _clean(folder: Path) -> None:
+    """Delete the parts that killed processes have left in a folder, the first time that something is written to it."""
+    if folder in _cleaned:
+        return
+    _cleaned.add(folder)
+    for path in [folder / name for name in os.listdir(folder) if _PART.fullmatch(name)]:
+        with suppress(OSError):  # others clean up, too
+            file = None if fcntl is None else os.open(path, os.O_RDWR | os.O_NOFOLLOW)
+            try:
+                if file is None or _lock(file):
+                    path.unlink()
+            finally:
+                if file is not None:
+                    os.close(file)
