@@ -1,8 +1,10 @@
 """Which files a command line reads and writes."""
 
 import argparse
+import importlib
 import re
 import sys
+import tempfile
 from pathlib import Path
 
 from . import core
@@ -69,14 +71,22 @@ def parse_share(text):
 
 
 def find_inputs(parser, verb, arguments):
-    """Set the inputs to the files of this share, and refuse those that cannot be processed, by `parser.error`."""
+    """Set the inputs to the files of this share, and refuse those that cannot be processed, by `parser.error`.
+
+    What folders have besides is told by the notices `left_out`, and `total` is the number of files of all shares.
+    """
     if arguments.out is not None and arguments.out.suffix.lower() not in verb.outputs:
         parser.error(f"--out must end in {', '.join(verb.outputs)}")
+    files, arguments.left_out = [], []
     try:
         given = [*arguments.inputs, *_listed(arguments.files_from)]
         if not given:
             parser.error("nothing says what to read: name files, or a list of them by --files-from")
-        files = [file for path in given for file in verb.expand(path, arguments)]
+        for path in given:
+            found = verb.expand(path, arguments)
+            files += found
+            if found != [path]:
+                arguments.left_out += _others(path, found, verb, arguments)
     except core.PointCloudError as error:
         parser.error(str(error))
     if arguments.out is not None and len(files) > 1:
@@ -85,7 +95,51 @@ def find_inputs(parser, verb, arguments):
     if arguments.out_dir is not None and len(set(written)) < len(written):
         parser.error("some inputs have the same name and would overwrite each other in --out-dir")
     number, count = arguments.part
-    arguments.inputs = files[number - 1 :: count]
+    arguments.inputs, arguments.total = files[number - 1 :: count], len(files)
+
+
+def _others(folder, taken, verb, arguments) -> list:
+    """Return notices of the files in a folder that are no inputs, and print them."""
+    names = {path.name for path in taken}
+    paths = (path for path in folder.iterdir() if path.name not in names and path.name[0] != ".")
+    others = [path.name for path in paths if path.is_file() and not verb.owns(path, arguments)]
+    if not others:
+        return []
+    shown = ", ".join(sorted(others, key=_natural)[:_SHOWN]) + (", ..." if len(others) > _SHOWN else "")
+    notice = f"Left out {len(others)} of the files in {folder}: {shown}."
+    print(notice, file=sys.stderr, flush=True)
+    return [notice]
+
+
+def check_outputs(verb, arguments):
+    """Refuse to begin where an output cannot be written, or a package for it is missing.
+
+    Raises
+    ------
+    PointCloudError
+    """
+    written = [path for one in arguments.inputs for path in outputs_of(verb, one, arguments)]
+    written += verb.written_once(arguments)
+    folders = {path.parent: path for path in written}
+    for path in written:
+        if path.is_dir():
+            raise core.PointCloudError(f"{path} is a folder. Choose another name.")
+    if any(path.suffix.lower() in core.files.SCANS for path in written):
+        check_scans()
+    for folder, path in folders.items():
+        with core.files.writing(path):
+            tempfile.TemporaryFile(dir=next(home for home in (folder, *folder.parents) if home.exists())).close()
+
+
+def check_scans():
+    """Refuse LAS and LAZ files where a package for them is missing, with a PointCloudError."""
+    for name in ("laspy", "lazrs"):
+        try:
+            importlib.import_module(name)
+        except ImportError as error:
+            raise core.PointCloudError(
+                f"LAS and LAZ files need laspy and lazrs, and {name} is missing. Install both, or take another format."
+            ) from error
 
 
 def check_beside(parser, arguments, option):
@@ -106,19 +160,6 @@ def _listed(source):
 
 
 def files_in(folder):
-    """Return the frames in a folder, numbered files of one name; or else all files with points, ordered by numbers."""
-    paths = all_files_in(folder)
-    try:
-        frames = core.files.numbered_files(folder)
-    except core.PointCloudError:  # files of several names, or without numbers
-        return paths
-    rest = sorted({path.name for path in paths} - {path.name for path in frames})
-    if rest:
-        print(f"{folder}: left out {', '.join(rest)}, which are no frames", file=sys.stderr, flush=True)
-    return frames
-
-
-def all_files_in(folder):
     """Return all files with points in a folder, ordered by numbers."""
     try:
         paths = [path for path in folder.iterdir() if path.suffix.lower() in _READ and path.is_file()]
@@ -131,6 +172,7 @@ def all_files_in(folder):
     return sorted(paths, key=lambda path: _natural(path.name))
 
 
+_SHOWN = 5  # names of what is left out
 _READ = (*core.files.READABLE, *core.files.SPLATS)
 
 

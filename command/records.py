@@ -13,7 +13,13 @@ from .inputs import outputs_of, read_files
 
 SUFFIX = ".jsonl"
 _NEEDED = {"path", "verb", "settings", "stamps", "elapsed", "ended"}  # in a record
-_NOT_SETTINGS = ("command", "files_from", "inputs", "out", "out_dir", "part", "report", "skip_done")
+_PLANS = ".plan"  # ending of the file beside a report that tells what is to be in it
+_PLANNED = {"planned", "verb", "settings", "share", "of", "files", "began"}  # in a line of that
+_NOT_SETTINGS = (
+    *("command", "files_from", "inputs", "left_out", "total"),
+    *("out", "out_dir", "part", "report", "skip_done"),
+)
+_UNREACHED = "It was to be processed, and was not reached: the program was stopped before, or is still at work."
 
 
 def add_report(parser):
@@ -64,6 +70,23 @@ class Records:
         """Whether an input is done, with the same settings, and nothing has changed since."""
         return {**self.read_stamps(path), **self._written_stamps(path)} in self._done[_name(path)]
 
+    def plan(self):
+        """Tell beside the report, if there is one, which inputs are to be processed, so that none is lost unseen."""
+        arguments = self._arguments
+        if arguments.report is None:
+            return
+        number, count = arguments.part
+        plan = {
+            "planned": [_name(path) for path in arguments.inputs],
+            "verb": self._verb.name,
+            "settings": self._settings,
+            "share": number,
+            "of": count,
+            "files": arguments.total,
+            "began": round(time.time(), 3),
+        }
+        _append(arguments.report.with_suffix(_PLANS), plan)
+
     def keep(self, path, line, seconds, read):
         """Append the record of an input to the report, if there is one.
 
@@ -87,11 +110,7 @@ class Records:
             "ended": round(time.time(), 3),
             **line,
         }
-        self._arguments.report.parent.mkdir(parents=True, exist_ok=True)
-        with open(self._arguments.report, "a+b") as file:
-            if file.tell() and not _ends_line(file):  # a writer was killed in its last line
-                file.write(b"\n")
-            file.write(json.dumps(record).encode() + b"\n")  # at once: a killed writer leaves whole lines before it
+        _append(self._arguments.report, record)
 
     def read_stamps(self, path) -> dict:
         """Return size and time of all files that are read for an input, by their paths; None for what is no file."""
@@ -120,13 +139,21 @@ def _plain(value):
     return value.tolist() if isinstance(value, np.ndarray) else str(value)
 
 
+def _append(path, record):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with open(path, "a+b") as file:
+        if file.tell() and not _ends_line(file):  # a writer was killed in its last line
+            file.write(b"\n")
+        file.write(json.dumps(record).encode() + b"\n")  # at once: a killed writer leaves whole lines before it
+
+
 def _ends_line(file):
     file.seek(-1, os.SEEK_END)
     return file.read(1) == b"\n"
 
 
 def read_reports(folder):
-    """Read all reports of a folder.
+    """Read all records in the reports of a folder.
 
     Parameters
     ----------
@@ -139,21 +166,58 @@ def read_reports(folder):
     int
         How many lines are no records: of writers that were killed.
     """
-    found, broken = [], 0
-    for report in sorted(folder.glob(f"*{SUFFIX}")):
+    lines = list(_lines(folder, SUFFIX))
+    found = [line for line in lines if line.keys() >= _NEEDED]
+    return sorted(found, key=lambda record: record["ended"]), len(lines) - len(found)
+
+
+def read_plans(folder) -> list:
+    """Read which inputs were to be processed, beside the reports of a folder, in the order in which that began."""
+    found = [line for line in _lines(folder, _PLANS) if line.keys() >= _PLANNED]
+    return sorted(found, key=lambda plan: plan["began"])
+
+
+def _lines(folder, ending):
+    """Yield the lines of all files of a folder as dictionaries, empty where they hold something else."""
+    for report in sorted(folder.glob(f"*{ending}")):
         for line in report.read_text(encoding="utf-8", errors="replace").splitlines():
             try:
                 record = json.loads(line)
             except ValueError:
                 record = None
-            if isinstance(record, dict) and record.keys() >= _NEEDED:
-                found.append(record)
-            else:
-                broken += 1
-    return sorted(found, key=lambda record: record["ended"]), broken
+            yield record if isinstance(record, dict) else {}
 
 
-def last_records(records) -> list:
-    """Return the last record of each verb on each file, of records in the order in which they ended, by their paths."""
+def last_records(records, plans=()) -> list:
+    """Return the last record of each verb on each file by their paths, or that it was planned and not reached.
+
+    Parameters
+    ----------
+    records : sequence of dict
+        In the order in which they ended.
+    plans : sequence of dict
+        In the order in which they began.
+    """
     last = {(record["path"], record["verb"]): record for record in records}
+    planned = {(path, plan["verb"]): plan for plan in plans for path in plan["planned"]}
+    for (path, verb), plan in planned.items():
+        known = last.get((path, verb))
+        if known is None or (known["settings"] != plan["settings"] and known["ended"] < plan["began"]):
+            last[path, verb] = {"path": path, "verb": verb, "elapsed": 0.0, "unreached": True, "error": _UNREACHED}
     return [last[key] for key in sorted(last)]
+
+
+def shares_not_begun(plans) -> dict:
+    """Return the numbers of files in the shares without a plan, beside those of the last plan of each verb."""
+    last = {plan["verb"]: plan for plan in plans}
+    found = {}
+    for verb, plan in last.items():
+        job = [plan[name] for name in ("settings", "of", "files")]
+        begun = {
+            other["share"]
+            for other in plans
+            if other["verb"] == verb and [other[name] for name in ("settings", "of", "files")] == job
+        }
+        for share in sorted({*range(1, plan["of"] + 1)} - begun):
+            found[f"{verb}, share {share} of {plan['of']}"] = len(range(share - 1, plan["files"], plan["of"]))
+    return {name: count for name, count in found.items() if count}

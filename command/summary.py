@@ -1,7 +1,7 @@
 """The verb that merges reports to one table."""
 
 from . import core
-from .records import SUFFIX, last_records, read_reports
+from .records import SUFFIX, last_records, read_plans, read_reports, shares_not_begun
 from .rows import TABLES, write_rows
 from .verb import Verb
 
@@ -15,10 +15,12 @@ class Report(Verb):
     help = "merge the reports of a folder to one table, with totals and errors"
     description = (
         f"Merge the reports of a folder (files ending in {SUFFIX}, of --report) to one table: a row for each file with"
-        " points, area, seconds, notices and error. Writes one JSON line with totals and errors."
+        " points, area, seconds, notices and error. Writes one JSON line with totals and errors, and"
+        " counts files that were to be processed and were not reached."
     )
     inputs = "folders with reports"
     outputs = TABLES
+    prints_all = True
 
     def expand(self, path, arguments):
         return [path]
@@ -27,14 +29,18 @@ class Report(Verb):
         if not path.is_dir():
             raise core.PointCloudError(f"There is no folder {path}. Name the one with the reports.")
         found, broken = read_reports(path)
-        records = last_records(found)
+        plans = read_plans(path)
+        records, waiting = last_records(found, plans), shares_not_begun(plans)
         if not records:
             raise core.PointCloudError(f"{path} has no reports. They are written by --report, and end in {SUFFIX}.")
         rows = [_row(record) for record in records]
         errors = [{"path": row["path"], "error": row["error"]} for row in rows if row["error"]]
+        errors += [{"path": None, "error": f"{name}, was not begun: {count} files"} for name, count in waiting.items()]
+        unseen = sum(waiting.values())
         totals = {
-            "files": len(rows),
-            "failed": len(errors),
+            "files": len(rows) + unseen,
+            "failed": sum(row["error"] is not None for row in rows) + unseen,
+            "unreached": sum(record.get("unreached", False) for record in records) + unseen,
             "points": sum(row["points"] or 0 for row in rows),
             "total_area": sum(row["total_area"] or 0.0 for row in rows),
             "elapsed": round(sum(row["elapsed"] for row in rows), 3),

@@ -7,7 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 
 from . import core, tile_choices, tile_work
-from .inputs import add_choices, all_files_in, las_choices, parse_share
+from .inputs import add_choices, files_in, las_choices, parse_share
 from .records import SUFFIX
 from .rows import TABLES, write_rows, write_text
 from .settings import LAPLACIAN, add_setting, chosen
@@ -66,7 +66,7 @@ class _Cutting(_TileVerb):
         parser.add_argument("--level", type=int, metavar="INT", help="last level of detail of COPC files to read")
 
     def expand(self, path, arguments):
-        return all_files_in(path) if path.is_dir() else [path]
+        return files_in(path) if path.is_dir() else [path]
 
     def check(self, parser, arguments):
         if arguments.part != (1, 1):
@@ -295,6 +295,7 @@ class TilesReport(_Stage):
     name = "tiles report"
     help = "tell the results and errors of all tiles, and totals"
     outputs = TABLES
+    prints_all = True
 
     def add_options(self, parser):
         tile_choices.add_files_of_tiles(parser, "--tile-format")

@@ -15,6 +15,7 @@ class Verb:
     inputs = "files"
     outputs = ()  # endings of its output files, the first one by default in folders; empty for no output
     reads = ()  # options with other input files, which are never overwritten
+    prints_all = False  # whether the line has all results, so that no output is missed
 
     def add_options(self, parser):
         """Add options beside inputs and outputs."""
@@ -29,6 +30,18 @@ class Verb:
     def beside(self, output, arguments) -> list:
         """Return the paths of further files that are written beside an output."""
         return []
+
+    def written_once(self, arguments) -> list:
+        """Return the paths of files that are written for all inputs together."""
+        return []
+
+    def owns(self, path, arguments) -> bool:
+        """Whether a file in a folder of inputs was written by this verb before, and is neither read nor told."""
+        return False
+
+    def failure(self, result) -> int:
+        """Return the exit code for a result, in which parts of the work may have failed."""
+        return 0
 
     def run(self, path, arguments, output) -> dict:
         """Process one file, write the output unless it is None, and return what to print."""

@@ -162,6 +162,7 @@ class Measure(ReferenceVerb):
     name = "measure"
     help = "measure every component and segment: points, area, boundary, volume, and the mean of a column"
     outputs = TABLES
+    prints_all = True
     settings = (
         Setting("volume", "Measure the volume within closed components, too. It takes longer", True),
         Setting("source", "Numbers at the points whose mean is wanted; empty for the roughness, if there is one", ""),

@@ -460,7 +460,7 @@ def test_a_folder_of_numbered_files(run, tmp_path, monkeypatch, verb):  # noqa: 
     (tmp_path / "frames").mkdir()
     for number in (9, 10):
         write(tmp_path / "frames" / f"f_{number}.csv", sphere_points(1000 + number))
-    (tmp_path / "frames" / "notes.csv").write_text("no frame")
+    (tmp_path / "frames" / "notes.md").write_text("no frame")
     code, lines = run(verb, "frames", *VERBS[verb], "--out-dir", "out", "--format", "ply")
     assert code == 0, lines
     assert [line["points"] for line in lines] == [1009, 1010]

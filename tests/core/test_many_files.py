@@ -3,7 +3,12 @@
 import errno
 import io
 import json
+import os
+import re
+import signal
+import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +18,7 @@ from benchmarks.samplings import fibonacci_sphere
 from command import records, verbs
 from command.main import run as run_command
 
+ROOT = Path(__file__).parents[2]
 POINTS = fibonacci_sphere(200)
 
 
@@ -40,13 +46,30 @@ class TestInputs:
         (folder / "empty").mkdir()
         assert run("info", folder / "empty") == (2, [])
 
-    def test_frames_of_a_folder_come_before_other_files(self, folder, capsys):
-        for name in ("f_10", "f_9", "notes"):
-            np.save(folder / f"{name}.npy", POINTS)
-        assert run_command(["info", str(folder)], verbs.make_verbs(), "meshfree") == 0
+    @pytest.mark.parametrize("count", [1, 2])
+    def test_a_numbered_name_hides_no_other(self, run, folder, count):
+        (folder / "few").mkdir()
+        for name in ("north", "south", *(f"east{number}" for number in range(2, 2 + count))):
+            np.save(folder / "few" / f"{name}.npy", POINTS)
+        _, lines = run("info", folder / "few")
+        assert len(names(lines)) == 2 + count
+        assert all(line["notices"] == [] for line in lines)
+
+    def test_what_is_left_out_of_a_folder_stands_in_the_report(self, run, folder, capsys):
+        (folder / "few").mkdir()
+        for name in ("f_10", "f_9", "plan"):
+            np.save(folder / "few" / f"{name}.npy", POINTS)
+        for number in range(7):
+            (folder / "few" / f"{number}.fls").write_text("of another kind")
+        report = folder / "r" / "1.jsonl"
+        given = "analyze", folder / "few", "--sequence", "--modes", 3, "--report", report
+        assert run_command([*map(str, given)], verbs.make_verbs(), "meshfree") == 0
         printed = capsys.readouterr()
-        assert names(map(json.loads, printed.out.splitlines())) == ["f_9.npy", "f_10.npy"]
-        assert "left out notes.npy, which are no frames" in printed.err
+        text = f"Left out 8 of the files in {folder / 'few'}: 0.fls, 1.fls, 2.fls, 3.fls, 4.fls, ..."
+        assert text in printed.err
+        first, second = map(json.loads, report.read_text().splitlines())
+        assert names([first, second]) == ["f_9.npy", "f_10.npy"]
+        assert [text in " ".join(record["notices"]) for record in (first, second)] == [True, False]
 
     def test_a_list_in_a_file_or_from_standard_input(self, run, folder, monkeypatch):
         wanted = [folder / "in" / name for name in ("LHD_650_11.npy", "LHD_651_10.npy")]
@@ -171,6 +194,50 @@ class TestReports:
         code, [line] = run("report", folder / "r")
         assert (code, line["files"], "1 lines are no records" in line["notices"][0]) == (0, 8, True)
 
+    @pytest.mark.parametrize("shares", [(1, 2), (2,)])
+    def test_files_that_were_never_reached_are_counted(self, run, folder, monkeypatch, shares):
+        """A program that ends at its second file, as by SIGKILL, and shares that were not begun."""
+
+        def end(self, path, *_):
+            if path.stem == "LHD_650_13":
+                raise KeyboardInterrupt
+            return {"points": 200}, []
+
+        monkeypatch.setattr(verbs.Info, "work", end)
+        for share in shares:
+            given = "info", folder / "in", "--part", f"{share}/2", "--report", folder / "r" / f"{share}.jsonl"
+            if share == 1:
+                with pytest.raises(KeyboardInterrupt):
+                    run(*given)
+            else:
+                run(*given)
+        code, [line] = run("report", folder / "r", "--out", folder / "table.csv")
+        assert (code, line["files"], line["points"]) == (0, 8, 600 + 200 * (1 in shares))
+        lost = [error["path"] for error in line["errors"] if "not reached" in error["error"]]
+        ends = ["650_13", "651_10", "651_14"] if 1 in shares else []
+        assert lost == [str(folder / "in" / f"LHD_{end}.npy") for end in ends]
+        assert ("share 1 of 2, was not begun: 4 files" in str(line["errors"])) == (1 not in shares)
+        assert line["unreached"] == (3 if 1 in shares else 4)
+        assert line["failed"] == line["unreached"] + 1
+        assert "8 files" in (folder / "table.csv").read_text().splitlines()[-1]
+        monkeypatch.undo()
+        for share in (1, 2):
+            run("info", folder / "in", "--part", f"{share}/2", "--report", folder / "r" / f"{share}.jsonl")
+        code, [line] = run("report", folder / "r")
+        assert (line["files"], line["failed"], line["unreached"], line["points"]) == (8, 1, 0, 1400)
+
+    def test_files_are_reached_by_the_last_settings_only(self, run, folder, monkeypatch):
+        self.thin(run, folder)
+        monkeypatch.setattr("command.main._do", lambda *_: 3)
+        self.thin(run, folder, "--skip-done")
+        assert run_command(["report", str(folder / "r")], verbs.make_verbs(), "meshfree") == 3
+        monkeypatch.undo()
+        assert run("report", folder / "r")[1][0]["unreached"] == 0
+        monkeypatch.setattr("command.main._do", lambda *_: 3)
+        self.thin(run, folder, "--count", 40)
+        monkeypatch.undo()
+        assert run("report", folder / "r")[1][0]["unreached"] == 8
+
     def test_reports_are_merged_with_totals_and_errors(self, run, folder):
         for k in (1, 2):
             options = "--no-volume", "--part", f"{k}/2", "--report", folder / "r" / f"{k}.jsonl"
@@ -237,3 +304,144 @@ def test_a_full_disk_is_told_as_one(run, folder, monkeypatch):
     code, [line] = run("convert", folder / "in" / "LHD_650_9.npy", "--out", folder / "a.ply")
     assert (code, "No space left" in line["error"]) == (3, True)
     assert not (folder / "a.ply").exists()
+
+
+class TestBefore:
+    """What is told before any work."""
+
+    @pytest.fixture(autouse=True)
+    def idle(self, monkeypatch):
+        def fail(*_):
+            raise AssertionError("it works")
+
+        monkeypatch.setattr(verbs.Info, "work", fail)
+        monkeypatch.setattr(verbs.ThinOut, "work", fail)
+
+    @pytest.mark.parametrize("option", ["--out-dir", "--out", "--report", "--out is a folder"])
+    def test_outputs_that_cannot_be_written(self, folder, capsys, option):
+        (folder / "file").write_text("no folder")
+        (folder / "folder.ply").mkdir()
+        given = {
+            "--out-dir": ("--out-dir", folder / "file" / "out"),
+            "--out": ("--out", folder / "file" / "out.ply"),
+            "--report": ("--report", folder / "file" / "r.jsonl"),
+            "--out is a folder": ("--out", folder / "folder.ply"),
+        }[option]
+        words = ["thin-out", folder / "in" / "LHD_650_9.npy", *given]
+        assert run_command([*map(str, words)], verbs.make_verbs(), "meshfree") == 2
+        told = capsys.readouterr()
+        assert told.out == ""
+        assert len(told.err.splitlines()) == 1
+        assert str(given[1]) in told.err
+
+    def test_a_full_disk(self, run, folder, monkeypatch):
+        def full(*_, **__):
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+        monkeypatch.setattr("tempfile.TemporaryFile", full)
+        assert run("thin-out", folder / "in", "--out-dir", folder / "out") == (3, [])
+
+    def test_wrong_usage_is_one_line(self, capsys):
+        for words in ("analyze", "analyze --none", "none", "", "tiles", "tiles none"):
+            assert run_command(words.split(), verbs.make_verbs(), "meshfree") == 2
+            told = capsys.readouterr()
+            assert (told.out, len(told.err.splitlines())) == ("", 1)
+            assert told.err.startswith("meshfree")
+            assert told.err.endswith("--help.\n")
+
+    def test_the_version(self, capsys):
+        assert run_command(["--version"], verbs.make_verbs(), "meshfree") == 0
+        version = re.search('^version = "(.+)"', (ROOT / "blender_manifest.toml").read_text(), re.MULTILINE)[1]
+        assert capsys.readouterr().out == f"meshfree {version}\n"
+
+    def test_the_help_of_verbs_of_two_words(self, capsys):
+        assert run_command(["tiles", "--help"], verbs.make_verbs(), "meshfree") == 0
+        told = capsys.readouterr().out
+        assert all(verb.name.partition(" ")[2] in told for verb in verbs.make_verbs() if verb.name.startswith("tiles "))
+
+
+def test_a_verb_without_any_output_says_so(run, folder):
+    given = "thin-out", folder / "in" / "LHD_650_9.npy", "--by", "number", "--count", 50
+    assert "No file is written" in run(*given)[1][0]["notices"][-1]
+    assert run(*given, "--out", folder / "a.ply")[1][0]["notices"] == []
+    assert run("info", folder / "in" / "LHD_650_9.npy")[1][0]["notices"] == []
+
+
+def test_another_run_on_the_same_share_is_told(run, folder):
+    given = "convert", folder / "in" / "LHD_650_9.npy", folder / "in" / "LHD_650_11.npy", "--out-dir", folder / "out"
+    (folder / "out").mkdir()
+    with core.files.holding(folder / "out" / ".share-1-of-2.lock"):
+        _, [line] = run(*given, "--part", "1/2")
+        assert line["notices"] == [f"Another run is at work on the same share of {folder / 'out'}."]
+        _, [line] = run(*given, "--part", "2/2")
+        assert line["notices"] == []
+    assert sorted(path.name for path in (folder / "out").iterdir()) == ["LHD_650_11.ply", "LHD_650_9.ply"]
+
+
+def test_an_error_of_the_program_itself_is_in_the_report_and_the_other_files_are_done(run, folder, monkeypatch):
+    def fail(self, path, *_):
+        if path.stem == "LHD_650_9":
+            raise KeyError("x")
+        return {"points": 200}, []
+
+    monkeypatch.setattr(verbs.Info, "work", fail)
+    code, lines = run("info", folder / "in" / "LHD_650_9.npy", folder / "in" / "LHD_650_11.npy")
+    assert (code, lines[0]["error"], lines[1]["points"]) == (1, "KeyError: 'x'", 200)
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="Windows has neither such signals nor such pipes")
+class TestEnds:
+    """As a process: how the program ends where it is stopped, or nobody reads what it prints."""
+
+    CODE = (
+        "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler);"
+        "from command.main import main; sys.exit(main())"
+    )
+
+    def start(self, *words, **streams):
+        given = [sys.executable, "-c", self.CODE, *map(str, words)]
+        return subprocess.Popen(
+            given, cwd=ROOT, text=True, **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **streams}
+        )
+
+    def test_a_closed_pipe(self, folder):
+        for words in (("info", folder / "in"), ("--help",), ("analyze", folder / "in", "--out-dir", folder / "out")):
+            reading, writing = os.pipe()
+            os.close(reading)
+            running = self.start(*words, stdout=writing)
+            os.close(writing)
+            _, told = running.communicate()
+            assert running.returncode == 141 or words == ("--help",)
+            assert "Traceback" not in told
+            assert "Broken" not in told
+
+    def test_closed_pipes_for_both(self, folder):
+        reading, writing = os.pipe()
+        os.close(reading)
+        running = self.start("analyze", folder / "in", "--report", folder / "r.jsonl", stdout=writing, stderr=writing)
+        os.close(writing)
+        assert running.wait() == 141
+        assert not (folder / "r.jsonl").exists() or "Broken" not in (folder / "r.jsonl").read_text()
+
+    def test_ctrl_c(self, folder):
+        np.save(folder / "large.npy", fibonacci_sphere(40000))
+        running = self.start(
+            "analyze", folder / "large.npy", "--out", folder / "out.ply", "--report", folder / "r.jsonl"
+        )
+        while "Neighbors" not in running.stderr.readline():
+            assert running.poll() is None
+        running.send_signal(signal.SIGINT)
+        _, told = running.communicate()
+        assert (running.returncode, told.splitlines()[-1]) == (130, "Stopped")
+        assert "Traceback" not in told
+        assert not (folder / "out.ply").exists()
+
+    @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="this system has no /dev/full")
+    def test_standard_output_on_a_full_disk(self, folder):
+        with open("/dev/full", "w") as full:
+            running = self.start("convert", folder / "in", "--out-dir", folder / "out", stdout=full)
+            _, told = running.communicate()
+        assert running.returncode == 3
+        assert "Standard output cannot be written: No space left" in told
+        assert "Traceback" not in told
+        assert len(list((folder / "out").iterdir())) == 7
