@@ -15,9 +15,10 @@ from time import perf_counter
 from . import core
 from .inputs import add_files, check_outputs, find_inputs, output_path, outputs_of, read_files
 from .records import Records, add_report, check_report
+from .verb import DONE, ELSEWHERE, FAILED, WRONG_USAGE
 from .verbs import make_verbs
 
-DONE, FAILED, WRONG_USAGE, ELSEWHERE, STOPPED, UNHEARD = 0, 1, 2, 3, 130, 141  # exit codes
+STOPPED, UNHEARD = 130, 141  # exit codes beside those of verbs
 _SCARCE = {errno.ENOMEM, errno.ENOSPC, errno.EDQUOT, errno.EFBIG}  # of errors that another machine may not have
 _NOT_WRITTEN = "No file is written: neither --out nor --out-dir is given."
 _PACKAGE = "meshfree-laplacian"

@@ -114,17 +114,18 @@ class Records:
 
     def read_stamps(self, path) -> dict:
         """Return size and time of all files that are read for an input, by their paths; None for what is no file."""
-        return {_name(file): _stamp(file) for file in read_files(self._verb, path, self._arguments)}
+        return {_name(file): stamp(file) for file in read_files(self._verb, path, self._arguments)}
 
     def _written_stamps(self, path):
-        return {_name(file): _stamp(file) for file in outputs_of(self._verb, path, self._arguments)}
+        return {_name(file): stamp(file) for file in outputs_of(self._verb, path, self._arguments)}
 
 
 def _name(path):
     return str(Path(path).resolve())
 
 
-def _stamp(path):
+def stamp(path):
+    """Return size and time of a file, in nanoseconds; None for what is no file."""
     try:
         known = os.stat(path)
     except OSError:

@@ -1,24 +1,29 @@
 """The verbs for clouds larger than memory: `tiles run`, and its stages one by one."""
 
 import argparse
+import contextlib
 import json
+import shutil
+import sys
 import time
 from dataclasses import fields
 from pathlib import Path
 
 from . import core, tile_choices, tile_work
-from .inputs import add_choices, files_in, las_choices, parse_share
-from .records import SUFFIX
+from .inputs import add_choices, check_scans, files_in, las_choices, parse_share
+from .records import SUFFIX, stamp
 from .rows import TABLES, write_rows, write_text
 from .settings import LAPLACIAN, add_setting, chosen
 from .stages import ToldStages
 from .tile_work import STORE
-from .verb import ONE_LINE, Verb
+from .verb import DONE, ELSEWHERE, FAILED, ONE_LINE, Verb
 
 _SETTINGS = [LAPLACIAN[field.name] for field in fields(core.LaplacianOptions)]
 _EACH = 0.01  # of the work is told
 _READ, _WRITTEN = 0.02, 0.02  # shares of a run that reading and writing files take about
 _CHOICES = ("classes", "withheld", "meters", "columns", "bounds", "level")  # options for what is read of files
+_SIZES = ("memory", "tile_points")  # options for how large tiles are
+_ONE_FILES = "one_files.json"  # in the store: which files of all results were written
 _REPORT = f"tiles{SUFFIX}"  # in the folder of a run
 
 
@@ -33,6 +38,10 @@ class _TileVerb(Verb):
     def expand(self, path, arguments):
         return [path]
 
+    def failure(self, result):
+        scarce = [error.get("scarce", False) for error in result.get("errors", ())]
+        return (ELSEWHERE if any(scarce) else FAILED) if scarce else DONE
+
     def check(self, parser, arguments):
         if arguments.part != (1, 1):
             parser.error("--part divides files, not tiles: use --tiles K/N with survey and measure")
@@ -42,6 +51,7 @@ class _Cutting(_TileVerb):
     """A verb that cuts files into tiles: all inputs together, into one folder."""
 
     inputs = "point clouds that are parts of one; or folders of such"
+    _own = ()  # the files that an earlier run has written, but for those of tiles, and its store
 
     def add_options(self, parser):
         parser.add_argument(
@@ -66,7 +76,22 @@ class _Cutting(_TileVerb):
         parser.add_argument("--level", type=int, metavar="INT", help="last level of detail of COPC files to read")
 
     def expand(self, path, arguments):
-        return files_in(path) if path.is_dir() else [path]
+        if not path.is_dir():
+            return [path]
+        return [file for file in files_in(path) if not self.owns(file, arguments)]
+
+    def owns(self, path, arguments):
+        if not self._own:
+            folder = arguments.folder / STORE
+            store = core.tiles.Store(folder) if folder.exists() else None
+            self._own = ({str((arguments.folder / _REPORT).resolve()), *_one_files(store)} if store else set(), store)
+        files, store = self._own
+        if store is None or str(path.resolve()) in store.manifest["sources"]:
+            return False
+        return str(path.resolve()) in files or tile_work.is_tile_path(path, arguments.folder)
+
+    def written_once(self, arguments):
+        return [arguments.folder / _REPORT]
 
     def check(self, parser, arguments):
         if arguments.part != (1, 1):
@@ -75,8 +100,23 @@ class _Cutting(_TileVerb):
             parser.error("--tile-points must be at least 1")
         if arguments.columns and not any(path.suffix.lower() in core.files.TEXTS for path in arguments.inputs):
             parser.error(f"--columns is for files of text, {', '.join(core.files.TEXTS)}")
+        for path in arguments.inputs:
+            if tile_work.is_tile_path(path, arguments.folder):
+                parser.error(f"results of tiles would overwrite {path}, which is read: choose another --out-dir")
         tile_choices.check_measures(parser, arguments)
         arguments.sources, arguments.inputs = arguments.inputs, [arguments.folder]
+
+    @contextlib.contextmanager
+    def alone(self, arguments):
+        """Refuse to work in a folder in which another run does."""
+        with core.files.writing(arguments.folder):
+            arguments.folder.mkdir(parents=True, exist_ok=True)
+            with core.files.holding(arguments.folder / ".run.lock") as alone:
+                if not alone:
+                    raise core.PointCloudError(
+                        f"Another run is at work in {arguments.folder}. Wait until it ends, or choose another folder."
+                    )
+                yield
 
     def cut(self, arguments, count, progress):
         """Return the store of a folder, for so many workers, and the notices of what was read; cut it if need be."""
@@ -84,12 +124,16 @@ class _Cutting(_TileVerb):
         options = core.LaplacianOptions(
             **{name: value.lower() if isinstance(value, str) else value for name, value in given.items()}
         )
+        if any(path.suffix.lower() in core.files.SCANS for path in arguments.sources):
+            check_scans()
         folder, memory = arguments.folder / STORE, arguments.memory or core.tiles.memory_of_worker(count)
         known = {
             "sources": [str(path.resolve()) for path in arguments.sources],
             "read": {name: getattr(arguments, name) for name in _CHOICES},
         }
-        measures = tile_choices.measures(arguments)
+        own = {"stamps": _stamps(arguments), "asked": {name: getattr(arguments, name) for name in _SIZES}}
+        measures, anew = tile_choices.measures(arguments), []
+        halo = core.tiles.halo_of(options)
         if folder.exists():
             store = core.tiles.Store(folder)
             same = {name: store.manifest["agreed"].get(name) for name in measures} == measures
@@ -97,19 +141,72 @@ class _Cutting(_TileVerb):
                 raise core.PointCloudError(
                     f"{arguments.folder} has tiles of other files or settings. Choose another folder, or delete it."
                 )
-            return store, _notices(store)
-        halo = core.tiles.halo_of(options)
+            _check_stamps(store.manifest.get("stamps", {}), own["stamps"], arguments.folder, "the tiles were cut")
+            if not _wants_others(store, own["asked"]):
+                return store, _notices(store)
+            anew = [f"The tiles are cut anew, for another {' or '.join(_options(_SIZES))} than before."]
         most = arguments.tile_points or core.tiles.points_of_tile(memory, options, halo)
+        if anew:
+            _delete(store, arguments.folder)
         sources = tile_work.Sources(
             arguments.sources, las_choices(arguments), arguments.columns, arguments.bounds, arguments.level
         )
         choices = {**measures, "halo": halo, "memory": memory, "workers": 1 if arguments.tile_points else count}
         while True:
             try:
-                store = _cut(sources, folder, most, options, known, choices, progress)
+                store = _cut(sources, folder, most, options, {**known, **own}, choices, progress)
             except tile_work.Incomplete:
                 continue  # without the file that broke off
-            return store, _notices(store)
+            try:
+                _check_stamps(own["stamps"], _stamps(arguments), arguments.folder, "reading began")
+            except core.PointCloudError:
+                shutil.rmtree(folder)
+                raise
+            return store, [*anew, *_notices(store)]
+
+
+def _stamps(arguments):
+    """Return size and time of each file that is read."""
+    return {str(path.resolve()): stamp(path) for path in arguments.sources}
+
+
+def _check_stamps(before, now, folder, since):
+    """Refuse files that have changed since."""
+    changed = [path for path, known in before.items() if now.get(path) != known]
+    if changed:
+        more = f" and {len(changed) - 1} more" if len(changed) > 1 else ""
+        sizes = [f"{found[0]:,} bytes" if found else "no file" for found in (before[changed[0]], now[changed[0]])]
+        how = f"{sizes[0]} then, {sizes[1]} now" if sizes[0] != sizes[1] else "another time, the same size"
+        raise core.PointCloudError(
+            f"{changed[0]}{more} changed since {since} ({how}): the results would be of neither. Choose another folder,"
+            f" or delete {folder}."
+        )
+
+
+def _wants_others(store, asked):
+    """Whether tiles of another size are wanted than a store has: not for other memory alone where all are measured."""
+    before = store.manifest.get("asked", dict.fromkeys(_SIZES))
+    other = [name for name in _SIZES if asked[name] not in (None, before[name])]
+    done = core.tiles.pending(store) is None and len(store.alive) == store.count
+    return "tile_points" in other or (bool(other) and not done)
+
+
+def _options(names):
+    return [f"--{name.replace('_', '-')}" for name in names]
+
+
+def _delete(store, folder):
+    """Delete tiles that are cut anew, with their files."""
+    for path in list(folder.iterdir()):
+        if tile_work.is_tile_path(path, folder) and str(path.resolve()) not in store.manifest["sources"]:
+            path.unlink()
+    shutil.rmtree(store.folder)
+
+
+def _one_files(store):
+    """Return the files of all results that were written from a store."""
+    path = store.folder / _ONE_FILES
+    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else []
 
 
 def _notices(store):
@@ -148,6 +245,10 @@ class TilesRun(_Cutting):
         tile_choices.add_files_of_tiles(parser)
         tile_choices.add_one_file(parser)
 
+    def written_once(self, arguments):
+        several = [arguments.one_file, tile_work.tile_path(arguments.folder, 0, tile_choices.ending(arguments))]
+        return [*super().written_once(arguments), *(path for path in several if path is not None and path.suffix)]
+
     def check(self, parser, arguments):
         super().check(parser, arguments)
         if arguments.workers < 1:
@@ -156,19 +257,56 @@ class TilesRun(_Cutting):
         _check_modes(parser, arguments, 0)
 
     def run(self, path, arguments, output):
-        with ToldStages(self.name, _EACH) as stages:
+        with self.alone(arguments), _ToldTiles(self.name, _EACH) as stages:
+            tile_work.check_workers(arguments.workers, arguments.scheduler, path)
             store, notices = self.cut(arguments, arguments.workers, _share(stages, 0.0, _READ))
             if arguments.modes:
                 core.tiles.ask_for_modes(store, arguments.modes, arguments.mode_points)
             with tile_work.workers(arguments.workers, arguments.scheduler) as spread:
 
                 def visit_all(step, numbers):
-                    return spread(core.tiles.visit_tile, [(str(store.folder), step, number) for number in numbers])
+                    [known] = [one for one in core.tiles.steps_of(store) if one.name == step]
+                    many = [(str(store.folder), step, number) for number in numbers]
+                    count = len(known.where(store))
+                    return stages.counted(spread(core.tiles.visit_tile, many), count - len(many), count)
 
-                core.tiles.run_steps(store, visit_all, _share(stages, _READ, 1.0 - _WRITTEN))
+                try:
+                    core.tiles.run_steps(store, visit_all, _share(stages, _READ, 1.0 - _WRITTEN))
+                except core.PointCloudError:
+                    _report(store, path, arguments)  # which tiles have failed before
+                    raise
                 written = _share(stages, 1.0 - _WRITTEN, 1.0)
                 _write(store, path, store.alive, arguments, spread, written)
-        return {**_report(store, path, arguments), "notices": [*notices, *_finish(store, arguments)]}
+            return {**_report(store, path, arguments), "notices": [*notices, *_finish(store, arguments)]}
+
+
+class _ToldTiles(ToldStages):
+    """Tells at how many of all tiles a step is done, and the time that is left of all steps."""
+
+    def __init__(self, label, each):
+        super().__init__(label, each)
+        self._tiles, self._first = "", None
+
+    def counted(self, visited, before, count):
+        """Yield what is visited, and count it after those before."""
+        for done, one in enumerate(visited, before + 1):
+            self._tiles = f", {done} of {count} tiles"
+            yield one
+        self._tiles = ""
+
+    def tell(self, stage, fraction):
+        now = time.monotonic()
+        began, before = self._first = self._first or (now, fraction)
+        left = (now - began) * (1.0 - fraction) / (fraction - before) if fraction > before + _EACH else None
+        rest = "" if left is None else f", {_duration(left)} left"
+        print(f"{self._label}: {stage}{self._tiles}, {fraction:.0%}{rest}", file=sys.stderr, flush=True)
+
+
+def _duration(seconds):
+    """Write a time for people."""
+    if seconds < 90.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
 
 
 class TilesCut(_Cutting):
@@ -178,9 +316,12 @@ class TilesCut(_Cutting):
     help = "cut a cloud larger than memory into tiles, the first stage"
 
     def run(self, path, arguments, output):
-        with ToldStages(self.name, _EACH) as stages:
+        with self.alone(arguments), ToldStages(self.name, _EACH) as stages:
             store, notices = self.cut(arguments, 1, stages)
-        return {"points": store.manifest["points"], "tiles": store.count, "notices": notices}
+        errors = tile_work.file_records(store)
+        broken = [{"file": record["file"], "error": record["error"]} for record in errors]
+        told = {"failed_files": len(broken), "errors": broken, "notices": notices}
+        return {"points": store.manifest["points"], "tiles": store.count, **told}
 
 
 class _Stage(_TileVerb):
@@ -340,6 +481,8 @@ def _finish(store, arguments):
     notices = tile_work.doubts(store)
     if arguments.one_file is not None:
         notices += tile_work.write_one(store, arguments.one_file, arguments.smoothed)
+        known = {*_one_files(store), str(arguments.one_file.resolve())}
+        write_text(store.folder / _ONE_FILES, json.dumps(sorted(known)))
     return notices
 
 
@@ -351,7 +494,8 @@ def _report(store, folder, arguments):
     lines = [{"path": record["file"], **shared, **record} for record in [*files, *records]]
     write_text(folder / _REPORT, "".join(f"{json.dumps(line)}\n" for line in lines))
     errors = [{"file": record["file"], "error": record["error"]} for record in files]
-    errors += [{"tile": record["tile"], "error": record["error"]} for record in records if "error" in record]
+    kinds = ("tile", "error", "scarce")
+    errors += [{name: record[name] for name in kinds} for record in records if "error" in record]
     modes = {"eigenvalues": tile_work.eigenvalues(store)} if store.agreed_after("spectrum") else {}
     return {**tile_work.totals(store, records), **modes, "failed_files": len(files), "errors": errors}
 

@@ -13,6 +13,7 @@ from . import clouds, core
 from .quantities import eigenvector_name, rows_of, written_by
 
 STORE = "store"  # the folder within that of a run
+_TILE = re.compile(r"tile_\d{6,}(_smoothed)?\.\w+")
 _PIECE = 1_000_000  # points that are read at once
 _SPAWNED = "distributed.nanny.pre-spawn-environ"
 _NEVER = 1 << 40  # bytes
@@ -36,6 +37,9 @@ _LOCAL = {
 _QUIET = {"DASK_LOGGING__DISTRIBUTED": "critical"}  # what workers meet while they are ended is no one's concern
 _CLOSING = 60  # seconds
 _IGNORE_STOP = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"  # this process ends its workers itself
+_CONNECTING = 15  # seconds
+_BRIEF = 200  # characters of an error of Dask
+_OF_DASK = {"asyncio", "concurrent", "dask", "distributed", "tornado"}  # modules of errors
 _PACKAGE = "meshfree-laplacian[scale]"
 
 
@@ -148,6 +152,11 @@ class Incomplete(Exception):
     """Points of a file were given, and more cannot be read."""
 
 
+def is_tile_path(path, folder):
+    """Whether a file may be that of the results of a tile, in the folder of a run."""
+    return path.resolve().parent == Path(folder).resolve() and _TILE.fullmatch(path.name) is not None
+
+
 def tile_path(folder, number, suffix):
     """Return the path of the results of a tile, in the folder of a run."""
     return Path(folder) / f"tile_{number:06d}{suffix}"
@@ -209,6 +218,69 @@ def one_by_one(function, many):
     return (function(*given) for given in many)
 
 
+def check_workers(count, address, folder):
+    """Refuse to begin where Dask is missing, or workers of a cluster that do not see a folder, or no cluster at all.
+
+    Raises
+    ------
+    PointCloudError
+    """
+    if count > 1 or address:
+        _imported()
+    if not address:
+        return
+    with _client(address) as client:
+        try:
+            blind = [worker for worker, sees in client.run(sees_folder, str(folder)).items() if not sees]
+        except Exception as error:  # of any sort, as workers raise them
+            raise core.PointCloudError(
+                f"The workers at {address} cannot run this program: {_brief(error)}. Install the same version there."
+            ) from error
+    if blind:
+        raise core.PointCloudError(
+            f"{len(blind)} workers at {address} do not see the folder {folder}, {blind[0]} among them. Choose one that"
+            " all see under the same path."
+        )
+
+
+def sees_folder(folder):
+    """Whether this process sees a folder."""
+    return Path(folder).is_dir()
+
+
+def _imported():
+    """Return Dask's packages."""
+    try:
+        import dask
+        import distributed
+    except ImportError as error:
+        raise core.PointCloudError(
+            f"Several workers need Dask, and {error.name} is missing. Install {_PACKAGE}, or use one worker."
+        ) from error
+    return dask, distributed
+
+
+@contextlib.contextmanager
+def _client(address):
+    """Connect to a scheduler."""
+    _, distributed = _imported()
+    for name in ("distributed", "asyncio"):  # what they tell is told in words of one's own
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    try:
+        client = distributed.Client(address, timeout=_CONNECTING)
+    except (OSError, ValueError, TypeError) as error:  # no answer, or no address at all
+        raise core.PointCloudError(
+            f"No scheduler of Dask answers at {address!r}: {_brief(error)}. Start it, or correct its address, such as"
+            " tcp://head:8786."
+        ) from error
+    with client:
+        yield client
+
+
+def _brief(error):
+    return f"{type(error).__name__}: {' '.join(str(error).split())[:_BRIEF]}".removesuffix(": ")
+
+
 @contextlib.contextmanager
 def workers(count, address):
     """Provide a function that calls another with a folder, and each of some arguments, on all workers.
@@ -224,25 +296,18 @@ def workers(count, address):
     ------
     callable
         Takes a function and tuples of arguments, and yields its results as they come. It may raise
-        `NotEnoughMemoryError`.
+        `NotEnoughMemoryError`, and a PointCloudError where the cluster fails.
     """
     if count == 1 and not address:
         yield one_by_one
         return
-    try:
-        import dask
-        from distributed import Client, KilledWorker, LocalCluster, as_completed
-        from distributed.scheduler import NoWorkerError
-    except ImportError as error:
-        raise core.PointCloudError(
-            f"Several workers need Dask, and {error.name} is missing. Install {_PACKAGE}, or use one worker."
-        ) from error
+    dask, distributed = _imported()
     with contextlib.ExitStack() as stack:
         if not address:
             spawned = {_SPAWNED: dask.config.get(_SPAWNED) | DASK[_SPAWNED] | _QUIET}
             logging.getLogger("distributed").setLevel(logging.CRITICAL)
             stack.enter_context(dask.config.set({**DASK, **_LOCAL, **spawned}))
-            address = LocalCluster(
+            address = distributed.LocalCluster(
                 n_workers=count,
                 threads_per_worker=1,
                 dashboard_address="127.0.0.1:0",  # any free port: without an address Dask asks for the same one always
@@ -251,16 +316,22 @@ def workers(count, address):
                 silence_logs=logging.CRITICAL,
             )
             stack.callback(_close, address, count)
-        client = stack.enter_context(Client(address))
+        client = stack.enter_context(_client(address))
 
         def spread(function, many):
             futures = client.map(function, *zip(*many, strict=True), pure=False) if many else []
             try:
-                yield from (done.result() for done in as_completed(futures))
-            except (KilledWorker, NoWorkerError) as error:
+                yield from (done.result() for done in distributed.as_completed(futures))
+            except (distributed.KilledWorker, distributed.scheduler.NoWorkerError) as error:
                 raise core.NotEnoughMemoryError(
                     "Workers ended one after the other, as where the memory is not enough. Go on with fewer workers, or"
-                    " cut into another folder with --tile-points for smaller tiles."
+                    " with --tile-points for smaller tiles, which are cut anew."
+                ) from error
+            except Exception as error:
+                if type(error).__module__.partition(".")[0] not in _OF_DASK:  # of a tile
+                    raise
+                raise core.PointCloudError(
+                    f"The cluster failed: {_brief(error)}. What is done stays: start the run again once it works."
                 ) from error
 
         yield spread
@@ -298,7 +369,7 @@ def tile_records(store, folder, suffix):
         }
         error = store.error(number)
         if error is not None:
-            records.append({**record, "error": error})
+            records.append({**record, "error": error, "scarce": store.is_scarce(number)})
         elif store.done("measure", number):
             area = float(store.read("measure", number, "areas").sum())
             notices = store.read("measure", number, "notices").tolist()
@@ -322,14 +393,19 @@ def eigenvalues(store):
 def totals(store, records):
     """Return the sums over all tiles."""
     measured = [record for record in records if "total_area" in record]
-    components = set()
+    components, points, on, doubtful = set(), sum(record["points"] for record in records), 0, 0
     for record in measured:
-        components |= set(np.unique(store.read("measure", record["tile"], "component")).tolist())
+        component = store.read("measure", record["tile"], "component")
+        components |= set(np.unique(component).tolist())
+        on += int(np.count_nonzero(component >= 0))
+        doubtful += int(np.count_nonzero((store.read("measure", record["tile"], "doubt") > 0) & (component >= 0)))
     return {
-        "points": sum(record["points"] for record in records),
+        "points": points,
         "measured_points": sum(record["points"] for record in measured),
         "total_area": float(sum(record["total_area"] for record in measured)),
         "component_count": len(components - {-1}),
+        "share_in_doubt": round(doubtful / max(points, 1), 6),
+        "share_unmeasured": round(1.0 - on / max(points, 1), 6),
         "tiles": len(records),
         "failed_tiles": sum("error" in record for record in records),
         "cpu_seconds": round(sum(record["elapsed"] for record in records), 3),

@@ -2,6 +2,7 @@
 
 from .inputs import files_in
 
+DONE, FAILED, WRONG_USAGE, ELSEWHERE = 0, 1, 2, 3  # exit codes; the last where another machine may do it
 ONE_LINE = "Writes one JSON line per input, with notices, or the error. The exit code is 1 if any input failed."
 
 
@@ -41,7 +42,7 @@ class Verb:
 
     def failure(self, result) -> int:
         """Return the exit code for a result, in which parts of the work may have failed."""
-        return 0
+        return DONE
 
     def run(self, path, arguments, output) -> dict:
         """Process one file, write the output unless it is None, and return what to print."""

@@ -23,7 +23,7 @@ _WANTED = "modes wanted"  # the name under which a store keeps that
 
 
 def ask_for_modes(store: Store, modes: int, most: int | None = None) -> None:
-    """Let a store have the low modes of its cloud, by further steps.
+    """Let a store have the low modes of its cloud, by further steps; those that it has for another question go.
 
     Parameters
     ----------
@@ -36,20 +36,19 @@ def ask_for_modes(store: Store, modes: int, most: int | None = None) -> None:
     Raises
     ------
     InvalidPointsError
-        No modes, or others than before.
+        No modes.
     """
     if most is None:
         memory = store.manifest["memory"]
         most = _MOST if memory is None else min(_MOST, memory // needed_memory(1, store.options, modes))
     if min(modes, most) < 1:
         raise InvalidPointsError(f"{modes} modes by {most} points were asked for. Ask for at least one.")
-    if not store.agreed_after(_WANTED):
-        store.settle(_WANTED, {"modes": np.array(modes), "mode points": np.array(most)})
-    elif (int(store.record["modes"]), int(store.record["mode points"])) != (modes, most):
-        raise InvalidPointsError(
-            f"{store.folder} has {int(store.record['modes'])} modes by {int(store.record['mode points'])} points. Ask"
-            " for these, or choose another folder."
-        )
+    if store.agreed_after(_WANTED):
+        had, by = int(store.record["modes"]), int(store.record["mode points"])
+        if (had, by) == (modes, most):
+            return
+        store.take_back([step.name for step in (MODES if by != most else MODES[1:])])
+    store.settle(_WANTED, {"modes": np.array(modes), "mode points": np.array(most)})
 
 
 def find_candidates(site: Site, state: Any) -> tuple[None, Told]:

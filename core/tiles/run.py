@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 
+from ..errors import ComponentError, NotEnoughMemoryError
 from ..types import FilePath, Progress
 from .cutting import HALOS
 from .modes import MODES
@@ -55,9 +56,12 @@ def settle(store: Store) -> bool:
 
     Raises
     ------
-    ComponentError
-        None of the tiles can be measured.
+    ComponentError, NotEnoughMemoryError
+        None of the tiles can be measured; for want of memory, if that is why of one.
     """
+    if not store.alive:
+        kind = NotEnoughMemoryError if any(map(store.is_scarce, range(store.count))) else ComponentError
+        raise kind("None of the tiles can be measured. See the error of each in the report.")
     waiting = pending(store)
     if waiting is not None and not waiting[1]:
         store.settle(waiting[0].name, agree(store, waiting[0], store.options))

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import ComponentError, PointCloudError
+from ..errors import PointCloudError
 from ..options import LaplacianOptions
 from . import measures, neighborhoods
 from .shelf import Record, Shelf, Told
@@ -125,13 +125,5 @@ def visit(shelf: Shelf, step: Step, number: int, options: LaplacianOptions) -> N
 
 
 def agree(shelf: Shelf, step: Step, options: LaplacianOptions) -> Record:
-    """Return what all tiles agree on after a step that has been at all of them.
-
-    Raises
-    ------
-    ComponentError
-        No tile is left that can be measured.
-    """
-    if not shelf.alive:
-        raise ComponentError("None of the tiles can be measured. See the error of each in the report.")
+    """Return what all tiles agree on after a step that has been at all of them."""
     return step.merge(shelf, options)

@@ -15,7 +15,7 @@ from typing import IO, Any
 import numpy as np
 
 from ..arguments import as_path
-from ..errors import PointCloudError
+from ..errors import NotEnoughMemoryError, PointCloudError
 from ..files import replacing
 from ..options import LaplacianOptions
 from ..types import Array, FilePath, Floats
@@ -188,16 +188,35 @@ class Store:
     def fail(self, step: str, number: int, error: PointCloudError) -> None:
         """Note that a tile cannot be measured."""
         with replacing(self._tile(number) / _ERROR) as part:
-            part.write_text(json.dumps({"step": step, "error": str(error)}), encoding="utf-8")
+            scarce = isinstance(error, NotEnoughMemoryError)
+            part.write_text(json.dumps({"step": step, "error": str(error), "scarce": scarce}), encoding="utf-8")
         self.forget(number)
 
     def error(self, number: int) -> str | None:
         """Return why a tile cannot be measured; None if it can."""
-        path = self._tile(number) / _ERROR
-        if not path.exists():
-            return None
-        text: str = json.loads(path.read_text(encoding="utf-8"))["error"]
+        text: str | None = self._failure(number).get("error")
         return text
+
+    def is_scarce(self, number: int) -> bool:
+        """Whether that is for want of memory."""
+        return bool(self._failure(number).get("scarce"))
+
+    def _failure(self, number: int) -> dict[str, Any]:
+        path = self._tile(number) / _ERROR
+        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+        return found
+
+    def take_back(self, steps: Sequence[str]) -> None:
+        """Delete what some steps have told, and what was agreed on after them; they must be the last ones.
+
+        If that is stopped, these steps can be taken again from where it was.
+        """
+        for step in reversed(steps):
+            self._agreed(step).unlink(missing_ok=True)
+        for step in reversed(steps):
+            for number in range(self.count):
+                self._path(step, number).unlink(missing_ok=True)
+        self.load_record()
 
     def _tile(self, number: int) -> Path:
         return tile_folder(self.folder, number)

@@ -1,13 +1,16 @@
 """The verbs for clouds larger than memory: from files to files of results, in one go or stage by stage."""
 
 import json
+import os
+import re
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import core
-from command import tile_work, verbs
+from command import tile_verbs, tile_work, verbs
 from command.main import run as run_command
 from command.stages import ToldStages
 from core.files import PointTable, read_points, write_points
@@ -212,8 +215,152 @@ def test_stages_give_the_same_to_the_bit(run, scans, done, tmp_path):
     assert "lb_eigenvector_003" in read_points(out / "tile_000001.ply").attributes
     code, [line] = run("tiles", "report", out, "--out", tmp_path / "table.csv")
     assert len(line["eigenvalues"]) == 3
+    assert (line["share_in_doubt"], line["share_unmeasured"]) == (doubtful(out), 0.0)
     assert (code, line["measured_points"], line["errors"]) == (0, COUNT, [])
     assert len((tmp_path / "table.csv").read_text().splitlines()) == 3
+
+
+def doubtful(out):
+    """Return the share of points whose trust is below one half."""
+    trust = np.concatenate([read_points(path).attributes["lb_trust"] for path in out.glob("tile_*.ply")])
+    return pytest.approx(np.mean(trust < 0.5), abs=1e-6)
+
+
+class TestAgain:
+    """A run is started again, with something changed."""
+
+    @pytest.fixture
+    def begun(self, run, scans, tmp_path):
+        """A folder of its own with the inputs, cut."""
+        (tmp_path / "in").mkdir()
+        for path in scans.iterdir():
+            (tmp_path / "in" / path.name).write_bytes(path.read_bytes())
+        run("tiles", "cut", tmp_path / "in", "--out-dir", tmp_path / "out", *OPTIONS)
+        return tmp_path
+
+    @pytest.mark.parametrize("change", ["size", "time", "gone"])
+    @pytest.mark.parametrize("verb", ["run", "cut"])
+    def test_inputs_that_changed_are_refused(self, run, begun, change, verb):
+        path = begun / "in" / "a.ply"
+        given = "tiles", verb, path, begun / "in" / "b.ply", "--out-dir", begun / "out", *OPTIONS
+        before = path.stat()
+        if change == "size":
+            path.write_bytes(path.read_bytes() + b"\n")
+            os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+        elif change == "time":
+            os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns + 10**9))
+        else:
+            path.unlink()
+        code, [line] = run(*given)
+        assert (code, f"{path} changed since the tiles were cut" in line["error"]) == (1, True)
+        told = {"size": f"{before.st_size + 1:,} bytes now", "time": "another time", "gone": "no file now"}
+        assert told[change] in line["error"]
+
+    def test_inputs_that_change_while_they_are_cut_leave_no_tiles(self, run, begun, monkeypatch):
+        path, original = begun / "in" / "a.ply", core.tiles.cut_to_store
+
+        def cut(*given, **choices):
+            store = original(*given, **choices)
+            path.write_bytes(path.read_bytes() + b"\n")
+            return store
+
+        monkeypatch.setattr(core.tiles, "cut_to_store", cut)
+        code, [line] = run("tiles", "cut", begun / "in", "--out-dir", begun / "new", *OPTIONS)
+        assert (code, "changed since reading began" in line["error"]) == (1, True)
+        assert not (begun / "new" / "store").exists()
+
+    def test_tiles_of_another_size_are_cut_anew(self, run, begun):
+        given = "tiles", "run", begun / "in", "--out-dir", begun / "out"
+        code, [line] = run(*given, *OPTIONS)
+        assert (code, line["tiles"], len(list((begun / "out").glob("tile_*.ply")))) == (0, 2, 2)
+        code, [line] = run(*given, "--tile-points", 700)
+        assert (code, line["tiles"], line["points"]) == (0, 4, COUNT)
+        assert "cut anew" in line["notices"][0]
+        code, [line] = run(*given, *OPTIONS)
+        assert (code, line["tiles"], len(list((begun / "out").glob("tile_*.ply")))) == (0, 2, 2)
+        assert run(*given)[1][0]["tiles"] == 2
+
+    def test_more_memory_measures_what_failed_for_want_of_it(self, run, tmp_path):
+        write_points(tmp_path / "a.ply", PointTable(np.random.default_rng(1).random((6000, 3))))
+        given = "tiles", "run", tmp_path / "a.ply", "--out-dir", tmp_path / "out", "--tile-points", 3000
+        code, lines = run(*given, "--memory", "15MB")
+        assert (code, "None of the tiles" in lines[0]["error"]) == (3, True)
+        told = [json.loads(text)["error"] for text in (tmp_path / "out" / "tiles.jsonl").read_text().splitlines()]
+        assert told
+        assert all("allow more memory" in error for error in told)
+        assert run(*given, "--memory", "15MB")[0] == 3
+        code, [line] = run(*given, "--memory", "4GB")
+        assert (code, line["failed_tiles"], line["measured_points"]) == (0, 0, 6000)
+        before = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("*.np?")}
+        code, [line] = run(*given, "--memory", "2GB")
+        assert (code, line["notices"]) == (0, [])
+        assert {path: path.stat().st_mtime_ns for path in before} == before
+
+    def test_other_modes_need_no_new_folder(self, run, begun):
+        given = "tiles", "run", begun / "in", "--out-dir", begun / "out", *OPTIONS
+        found = {}
+        for modes, by in ((2, 500), (4, 500), (3, 400)):
+            code, [line] = run(*given, "--modes", modes, "--mode-points", by)
+            assert (code, len(line["eigenvalues"])) == (0, modes)
+            found[by, modes] = line["eigenvalues"]
+            names = read_points(begun / "out" / "tile_000001.ply").attributes
+            assert [f"lb_eigenvector_{number:03d}" in names for number in range(1, 5)] == [n < modes for n in range(4)]
+        np.testing.assert_allclose(found[500, 2], found[500, 4][:2], rtol=1e-6, atol=1e-9)
+        assert found[400, 3][1] != found[500, 4][1]
+        assert run(*given)[1][0]["eigenvalues"] == found[400, 3]
+
+    @pytest.mark.parametrize("one_file", [False, True])
+    def test_one_folder_for_inputs_and_outputs(self, run, begun, one_file):
+        given = ["tiles", "run", begun / "in", "--out-dir", begun / "in", *OPTIONS, "--format", "ply"]
+        given += ["--one-file", begun / "in" / "all.ply"] if one_file else []
+        for _ in range(2):
+            code, [line] = run(*given)
+            assert (code, line["points"], line["tiles"], line["notices"]) == (0, COUNT, 2, [])
+        assert run(*given[:5], *OPTIONS)[1][0]["points"] == COUNT
+        write_points(begun / "in" / "c.ply", PointTable(core.example_sphere()))
+        assert "other files or settings" in run(*given)[1][0]["error"]
+
+    def test_results_never_replace_what_is_read(self, run, begun, capsys):
+        (begun / "in" / "a.ply").rename(begun / "in" / "tile_000000.ply")
+        before = (begun / "in" / "tile_000000.ply").read_bytes()
+        given = "tiles", "run", begun / "in", "--out-dir", begun / "in", *OPTIONS
+        assert run_command([*map(str, given)], verbs.make_verbs(), "meshfree") == 2
+        assert "would overwrite" in capsys.readouterr().err
+        assert (begun / "in" / "tile_000000.ply").read_bytes() == before
+
+    def test_another_run_at_work_is_told(self, run, begun):
+        with core.files.holding(begun / "out" / ".run.lock"):
+            for verb in ("run", "cut"):
+                code, [line] = run("tiles", verb, begun / "in", "--out-dir", begun / "out", *OPTIONS)
+                assert (code, "Another run is at work" in line["error"]) == (1, True)
+        assert run("tiles", "run", begun / "in", "--out-dir", begun / "out", *OPTIONS)[0] == 0
+        assert not (begun / "out" / ".run.lock").exists()
+
+
+def test_packages_that_are_missing_are_told_before_any_work(run, scans, tmp_path, monkeypatch):
+    for name in ("laspy", "distributed"):
+        monkeypatch.setitem(sys.modules, name, None)
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "a.laz").write_bytes(b"")
+    monkeypatch.setattr(core.tiles, "cut_to_store", None)
+    code, [line] = run("tiles", "run", tmp_path / "in", "--out-dir", tmp_path / "out")
+    assert (code, "laspy is missing" in line["error"]) == (1, True)
+    assert run("tiles", "run", scans, "--out-dir", tmp_path / "out", "--format", "laz") == (2, [])
+    for option in (("--workers", 2), ("--scheduler", "tcp://localhost:1")):
+        code, [line] = run("tiles", "run", scans, "--out-dir", tmp_path / "out", *option)
+        assert (code, "Dask" in line["error"]) == (1, True)
+
+
+def test_progress_tells_tiles_of_all_and_the_time_left(scans, tmp_path, capsys):
+    given = "tiles", "run", scans, "--out-dir", tmp_path / "out", *OPTIONS
+    assert run_command([*map(str, given)], verbs.make_verbs(), "meshfree") == 0
+    told = capsys.readouterr().err.splitlines()
+    assert any(re.fullmatch(r"tiles run: Areas, 1 of 2 tiles, \d+%, \d+ s left", line) for line in told)
+
+
+@pytest.mark.parametrize(("seconds", "text"), [(5.2, "5 s"), (89.0, "89 s"), (120.0, "2 min"), (9000.0, "2.5 h")])
+def test_durations(seconds, text):
+    assert tile_verbs._duration(seconds) == text
 
 
 def test_stages_in_a_wrong_order_are_told(run, scans, tmp_path):
@@ -227,7 +374,10 @@ def test_a_broken_tile_is_told_and_the_others_written(run, scans, tmp_path):
     run("tiles", "cut", scans, "--out-dir", out, *OPTIONS)
     np.save(out / "store" / "000001" / "points.npy", 1e3 + 1e-3 * np.eye(3))
     code, [line] = run("tiles", "run", scans, "--out-dir", out, *OPTIONS)
-    assert (code, line["failed_tiles"], line["errors"][0]["tile"]) == (0, 1, 1)
+    assert (code, line["failed_tiles"], line["errors"][0]["tile"]) == (1, 1, 1)
+    assert line["share_unmeasured"] == pytest.approx(3 / line["points"], abs=1e-6)
+    assert run("tiles", "report", out)[0] == 1
+    assert run("tiles", "run", scans, "--out-dir", out, *OPTIONS, "--report", tmp_path / "r.jsonl")[0] == 0
     assert [path.name for path in out.glob("tile_*")] == ["tile_000000.ply"]
     assert run("report", out)[1][0]["failed"] == 1
 
@@ -254,7 +404,8 @@ def test_what_is_wrong_with_some_files_of_a_delivery_is_told_and_the_others_done
     out = tmp_path / "out"
     options = ("--columns", "z y x intensity", *OPTIONS, "--memory", "15MB")
     code, [line] = run("tiles", "run", tmp_path / "files", "--out-dir", out, *options)
-    assert (code, line["points"], line["measured_points"]) == (0, COUNT + 6000, COUNT)
+    assert (code, line["points"], line["measured_points"]) == (3, COUNT + 6000, COUNT)
+    assert line["share_unmeasured"] == pytest.approx(6003 / (COUNT + 6000), abs=1e-6)
     broken = [error for error in line["errors"] if "file" in error]
     assert [Path(error["file"]).name for error in broken] == ["cut_off.ply", "garbage.laz"]
     full = [error for error in line["errors"] if "tile" in error]

@@ -1,14 +1,17 @@
 """Clouds larger than memory on several workers: the installed program with Dask, and a worker killed in the middle."""
 
+import contextlib
 import json
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import time
 
 import dask
+import distributed
 import numpy as np
 import psutil
 import pytest
@@ -163,3 +166,86 @@ def test_the_manual_has_the_settings_of_dask(place):
     page = (ROOT / "docs" / "tiles.md").read_text(encoding="utf-8")
     [text] = re.findall(r"^```yaml\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
     assert yaml.safe_load(text) == wanted
+
+
+def run(place, folder, *arguments):
+    """Run tiles in a folder, and return the exit code, the last line, and what is told besides."""
+    known = {**os.environ, "PYTHONPATH": str(site(place)), "OPENBLAS_NUM_THREADS": "1"}
+    given = [sys.executable, "-c", CODE, "tiles", "run", "rod.npy", *map(str, (*arguments, *OPTIONS))]
+    done = subprocess.run(given, cwd=folder, env=known, capture_output=True, text=True, timeout=250)
+    return done.returncode, json.loads(done.stdout.splitlines()[-1]), done.stderr
+
+
+@pytest.fixture
+def cluster(place):
+    """Function that starts a scheduler and a worker, with the program or without it; returns them and the address."""
+    started = []
+
+    def start(knows=True):
+        known = {**os.environ, "DASK_LOGGING__DISTRIBUTED": "critical", "OPENBLAS_NUM_THREADS": "1"}
+        known["PYTHONPATH"] = str(site(place)) if knows else ""
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            port = free.getsockname()[1]
+        address = f"tcp://127.0.0.1:{port}"
+        commands = (
+            ["dask_scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard"],
+            ["dask_worker", address, "--nthreads", 1, "--no-dashboard"],
+        )
+        for name, *given in commands:
+            command = [sys.executable, "-m", f"distributed.cli.{name}", *map(str, given)]
+            quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+            started.append(subprocess.Popen(command, env=known, cwd="/", start_new_session=True, **quiet))
+        with distributed.Client(address, timeout=60) as client:
+            client.wait_for_workers(1, timeout=60)
+        return started, address
+
+    yield start
+    for one in started:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(one.pid, signal.SIGKILL)
+        one.wait()
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nowhere", "tcp://no.such.host.invalid:8786"])
+def test_a_scheduler_that_does_not_answer_is_told_before_any_work(place, folder, tmp_path, address):
+    code, line, besides = run(place, folder, "--out-dir", tmp_path / "out", "--scheduler", address)
+    assert (code, "No scheduler of Dask answers" in line["error"], address in line["error"]) == (1, True, True)
+    assert "Traceback" not in besides
+    assert not (tmp_path / "out" / "store").exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL there")
+class TestCluster:
+    def test_workers_that_cannot_run_the_program_are_told_before_any_work(self, place, folder, tmp_path, cluster):
+        _, address = cluster(knows=False)
+        code, line, besides = run(place, folder, "--out-dir", tmp_path / "out", "--scheduler", address)
+        assert (code, "cannot run this program" in line["error"]) == (1, True)
+        assert "Install the same version there" in line["error"]
+        assert "Traceback" not in besides
+        assert not (tmp_path / "out" / "store").exists()
+
+    def test_a_scheduler_that_ends_in_the_middle_is_told_and_the_run_goes_on_later(
+        self, place, folder, tmp_path, cluster
+    ):
+        (scheduler, _), address = cluster()
+        out = tmp_path / "out"
+        known = {**os.environ, "PYTHONPATH": str(site(place)), "OPENBLAS_NUM_THREADS": "1"}
+        given = [sys.executable, "-c", CODE, "tiles", "run", "rod.npy", "--out-dir", out, *OPTIONS]
+        given += ["--scheduler", address]
+        running = subprocess.Popen(
+            list(map(str, given)), cwd=folder, env=known, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        try:
+            while not (out / "store" / KILLED_AFTER).exists():
+                assert running.poll() is None
+                time.sleep(0.02)
+            os.killpg(scheduler.pid, signal.SIGKILL)
+            printed, besides = running.communicate(timeout=250)
+        finally:
+            running.kill()
+        assert running.returncode == 1
+        assert "The cluster failed" in json.loads(printed.splitlines()[-1])["error"]
+        assert "Traceback" not in besides
+        code, line, _ = run(place, folder, "--out-dir", out)
+        assert (code, line["points"], line["failed_tiles"]) == (0, COUNT, 0)
