@@ -306,6 +306,17 @@ def test_a_full_disk_is_told_as_one(run, folder, monkeypatch):
     assert not (folder / "a.ply").exists()
 
 
+@pytest.mark.parametrize(("name", "times"), [("a.npy", 3), ("a.xyz", 3)])
+def test_a_file_that_does_not_fit_the_memory_is_not_read(run, tmp_path, monkeypatch, name, times):
+    np.savetxt(tmp_path / name, POINTS) if name == "a.xyz" else np.save(tmp_path / name, POINTS)
+    size = (tmp_path / name).stat().st_size
+    monkeypatch.setattr(core.files.formats, "available_memory", lambda: times * size - 1)
+    code, [line] = run("info", tmp_path / name)
+    assert (code, "GB of memory are free" in line["error"]) == (3, True)
+    monkeypatch.setattr(core.files.formats, "available_memory", lambda: times * size)
+    assert run("info", tmp_path / name)[0] == 0
+
+
 class TestBefore:
     """What is told before any work."""
 
