@@ -288,11 +288,16 @@ class _ToldTiles(ToldStages):
         self._tiles, self._first = "", None
 
     def counted(self, visited, before, count):
-        """Yield what is visited, and count it after those before."""
-        for done, one in enumerate(visited, before + 1):
-            self._tiles = f", {done} of {count} tiles"
-            yield one
-        self._tiles = ""
+        """Count what is visited, after those before, from now on; return it."""
+        self._tiles = f", {before} of {count} tiles"
+
+        def counted():
+            for done, one in enumerate(visited, before + 1):
+                self._tiles = f", {done} of {count} tiles"
+                yield one
+            self._tiles = ""
+
+        return counted()
 
     def tell(self, stage, fraction):
         now = time.monotonic()

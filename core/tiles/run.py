@@ -107,7 +107,8 @@ def run_steps(
         step, numbers = waiting
         begin, end = part_of(steps_of(store), step)
         count = len(step.where(store))
+        visited = (visit_all or one_by_one)(step.name, numbers)
         report(step.stage, begin)
-        for left, _ in enumerate((visit_all or one_by_one)(step.name, numbers), 1 - len(numbers)):
+        for left, _ in enumerate(visited, 1 - len(numbers)):
             report(step.stage, end + (end - begin) * left / count)
         settle(store)
