@@ -8,6 +8,7 @@ import tempfile
 from pathlib import Path
 
 from . import core
+from .stages import tell_aside
 
 
 def add_files(parser, verb):
@@ -107,7 +108,7 @@ def _others(folder, taken, verb, arguments) -> list:
         return []
     shown = ", ".join(sorted(others, key=_natural)[:_SHOWN]) + (", ..." if len(others) > _SHOWN else "")
     notice = f"Left out {len(others)} of the files in {folder}: {shown}."
-    print(notice, file=sys.stderr, flush=True)
+    tell_aside(notice)
     return [notice]
 
 

@@ -15,8 +15,9 @@ from time import perf_counter
 from . import core
 from .inputs import add_files, check_outputs, find_inputs, output_path, outputs_of, read_files
 from .records import Records, add_report, check_report
+from .stages import tell_aside
 from .verb import DONE, ELSEWHERE, FAILED, WRONG_USAGE
-from .verbs import make_verbs
+from .verbs import Frames, make_verbs
 
 STOPPED, UNHEARD = 130, 141  # exit codes beside those of verbs
 _SCARCE = {errno.ENOMEM, errno.ENOSPC, errno.EDQUOT, errno.EFBIG}  # of errors that another machine may not have
@@ -35,11 +36,10 @@ def main() -> int:
         sys.stdout.flush()
         return code
     except KeyboardInterrupt:
-        print("Stopped", file=sys.stderr)
+        tell_aside("Stopped")
         return STOPPED
     except BrokenPipeError:
-        for stream in (sys.stdout, sys.stderr):
-            _silence(stream)
+        _silence(sys.stdout)
         return UNHEARD
 
 
@@ -73,8 +73,10 @@ def run(argv, verbs, program) -> int:
             with core.files.writing(arguments.report):
                 records.plan()
         except core.PointCloudError as error:
-            print(f"{program} {verb.name}: {error}", file=sys.stderr, flush=True)
+            tell_aside(f"{program} {verb.name}: {error}")
             return ELSEWHERE if _is_scarcity(error) else WRONG_USAGE
+        if arguments.out is None and arguments.out_dir is None and isinstance(verb, Frames):
+            tell_aside(f"{program} {verb.name}: {_NOT_WRITTEN}")
         code = DONE
         for place, path in enumerate(arguments.inputs):
             told = [*notices, *([] if place else arguments.left_out)]
@@ -103,13 +105,11 @@ def _delete_empty(folder):
 def _do(verb, path, arguments, records, notices) -> int:
     """Process an input, tell and record how that went, and return the exit code for it."""
     if records.holds(path):
-        return _tell({"file": str(path), "skipped": True})
+        return _tell({"file": str(path), "skipped": True, **({"notices": notices} if notices else {})})
     began, read = perf_counter(), records.read_stamps(path)
     try:
         result = _process(verb, path, arguments)
         code = verb.failure(result)
-    except BrokenPipeError:
-        raise
     except Exception as error:  # of any sort, so that the other files are done, and this one is in the report
         result, code = {"error": _text(error)}, ELSEWHERE if _is_scarcity(error) else FAILED
         if not isinstance(error, _EXPECTED):
@@ -123,7 +123,7 @@ def _do(verb, path, arguments, records, notices) -> int:
     try:
         records.keep(path, line, perf_counter() - began, read)
     except OSError as error:
-        print(f"{arguments.report} cannot be written: {error.strerror or error}", file=sys.stderr, flush=True)
+        tell_aside(f"{arguments.report} cannot be written: {error.strerror or error}")
         code = max(code, ELSEWHERE if _is_scarcity(error) else FAILED)
     return code
 
@@ -136,7 +136,7 @@ def _tell(line) -> int:
         raise
     except OSError as error:
         _silence(sys.stdout)
-        print(f"Standard output cannot be written: {error.strerror or error}", file=sys.stderr, flush=True)
+        tell_aside(f"Standard output cannot be written: {error.strerror or error}")
         return ELSEWHERE if _is_scarcity(error) else FAILED
     return DONE
 

@@ -1,6 +1,7 @@
 """Times of the stages of a computation, and its progress."""
 
 import math
+import os
 import sys
 from time import perf_counter
 
@@ -76,4 +77,12 @@ class ToldStages(StageTimes):
 
     def tell(self, stage, fraction):
         """Write the line of a stage that begins."""
-        print(f"{self._label}: {stage}, {fraction:.0%}", file=sys.stderr, flush=True)
+        tell_aside(f"{self._label}: {stage}, {fraction:.0%}")
+
+
+def tell_aside(text):
+    """Write a line on standard error, or nothing from then on where nobody reads that any more."""
+    try:
+        print(text, file=sys.stderr, flush=True)
+    except BrokenPipeError:
+        sys.stderr = open(os.devnull, "w")  # noqa: SIM115

@@ -4,7 +4,6 @@ import argparse
 import contextlib
 import json
 import shutil
-import sys
 import time
 from dataclasses import fields
 from pathlib import Path
@@ -14,7 +13,7 @@ from .inputs import add_choices, check_scans, files_in, las_choices, parse_share
 from .records import SUFFIX, stamp
 from .rows import TABLES, write_rows, write_text
 from .settings import LAPLACIAN, add_setting, chosen
-from .stages import ToldStages
+from .stages import ToldStages, tell_aside
 from .tile_work import STORE
 from .verb import DONE, ELSEWHERE, FAILED, ONE_LINE, Verb
 
@@ -304,7 +303,7 @@ class _ToldTiles(ToldStages):
         began, before = self._first = self._first or (now, fraction)
         left = (now - began) * (1.0 - fraction) / (fraction - before) if fraction > before + _EACH else None
         rest = "" if left is None else f", {_duration(left)} left"
-        print(f"{self._label}: {stage}{self._tiles}, {fraction:.0%}{rest}", file=sys.stderr, flush=True)
+        tell_aside(f"{self._label}: {stage}{self._tiles}, {fraction:.0%}{rest}")
 
 
 def _duration(seconds):

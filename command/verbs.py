@@ -95,6 +95,8 @@ class Convert(CloudVerb):
 class Frames:
     """A verb that takes its inputs as frames of a sequence, if the option `sequence` is given."""
 
+    prints_all = True  # but what is at each point, which is said on standard error
+
     def add_sequence(self, parser):
         """Add the option."""
         parser.add_argument(

@@ -66,8 +66,6 @@ def writing(path: Path) -> Iterator[None]:
     """
     try:
         yield
-    except BrokenPipeError:  # of what is printed meanwhile
-        raise
     except (OSError, RuntimeError) as error:
         if isinstance(error, RuntimeError) and type(error).__module__ != "lazrs":
             raise

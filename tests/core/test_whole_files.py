@@ -81,10 +81,9 @@ def test_a_short_write_is_a_full_disk(tmp_path, error):
     assert caught.value.__cause__.errno == errno.ENOSPC
 
 
-@pytest.mark.parametrize("error", [RuntimeError("of another kind"), BrokenPipeError(errno.EPIPE, "of what is printed")])
-def test_other_errors_pass(tmp_path, error):
-    with pytest.raises(type(error), match="of"), writing(tmp_path):
-        raise error
+def test_other_errors_pass(tmp_path):
+    with pytest.raises(RuntimeError, match="of another kind"), writing(tmp_path):
+        raise RuntimeError("of another kind")
 
 
 class TestWriters:
