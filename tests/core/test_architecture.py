@@ -118,7 +118,18 @@ def test_operators_draw_nothing_and_call_no_operator(call):
     assert [file.name for file in files if re.search(call, file.read_text(encoding="utf-8"))] == []
 
 
-GROUND = {"arguments", "control_groups", "cores", "errors", "frozen", "kernel", "memory", "options", "progress", "types"}
+GROUND = {
+    "arguments",
+    "control_groups",
+    "cores",
+    "errors",
+    "frozen",
+    "kernel",
+    "memory",
+    "options",
+    "progress",
+    "types",
+}
 BELOW = {  # what each wing of core may use
     "algebra": {"cores", "errors", "types"},
     "geometry": GROUND | {"algebra"},
