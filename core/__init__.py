@@ -7,8 +7,8 @@ Examples in the docstrings can be copied as they are. All but one begin with the
 unit sphere, where answers are known:
 
 >>> import numpy as np
->>> import core
->>> points = core.example_sphere()
+>>> import meshfree_laplacian as mf
+>>> points = mf.example_sphere()
 """
 
 import ast

@@ -25,8 +25,8 @@ def example_sphere(count: int = 800) -> Floats:
     Examples
     --------
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
     >>> print(points.shape, np.allclose(np.linalg.norm(points, axis=1), 1.0))
     (800, 3) True
     """

@@ -57,16 +57,16 @@ class LaplacianOptions:
     Half the distance to the 100th neighbour as the smoothing length, here about ``2 sqrt(100 / 800) / 2``:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> options = core.LaplacianOptions(bandwidth="local", bandwidth_factor=0.5)
-    >>> lengths = core.build_laplacian(points, options=options).smoothing_lengths
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> options = mf.LaplacianOptions(bandwidth="local", bandwidth_factor=0.5)
+    >>> lengths = mf.build_laplacian(points, options=options).smoothing_lengths
     >>> print(lengths.mean().round(2))
     0.35
-    >>> core.LaplacianOptions(bandwidth="wide")
+    >>> mf.LaplacianOptions(bandwidth="wide")
     Traceback (most recent call last):
         ...
-    core.errors.PointCloudError: Option bandwidth is 'wide'. Choose one of adaptive, local, global.
+    meshfree_laplacian.errors.PointCloudError: Option bandwidth is 'wide'. Choose one of adaptive, local, global.
     """
 
     bandwidth: str = "adaptive"

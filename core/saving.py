@@ -43,13 +43,13 @@ def save(laplacian: LaplaceBeltrami, path: FilePath) -> None:
     Examples
     --------
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
     >>> import tempfile
-    >>> laplacian = core.build_laplacian(points)
+    >>> laplacian = mf.build_laplacian(points)
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     core.save(laplacian, folder + "/sphere.npz")
-    ...     again = core.load(folder + "/sphere.npz")
+    ...     mf.save(laplacian, folder + "/sphere.npz")
+    ...     again = mf.load(folder + "/sphere.npz")
     >>> print(np.array_equal(again.apply(points), laplacian.apply(points)))
     True
     """

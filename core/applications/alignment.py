@@ -144,12 +144,12 @@ def align(
     An ellipsoid, rotated by ten degrees and moved, is brought back:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
     >>> body = points * [1.0, 0.7, 0.5]
     >>> cosine, sine = np.cos(np.radians(10.0)), np.sin(np.radians(10.0))
     >>> moved = body @ [[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]] + [0.1, 0.0, 0.05]
-    >>> found = core.align(moved, body)
+    >>> found = mf.align(moved, body)
     >>> print(found.converged, np.allclose(moved @ found.matrix[:3, :3].T + found.matrix[:3, 3], body))
     True True
     """
@@ -208,9 +208,9 @@ def match_places(places: ArrayLike, others: ArrayLike, *, scale: bool = False) -
     Examples
     --------
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> matrix = core.match_places(points[:3], points[:3] + [2.0, 0.0, 0.0])
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> matrix = mf.match_places(points[:3], points[:3] + [2.0, 0.0, 0.0])
     >>> print(np.allclose(matrix[:3, 3], [2.0, 0.0, 0.0]), np.allclose(matrix[:3, :3], np.eye(3)))
     True True
     """

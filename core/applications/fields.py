@@ -88,11 +88,11 @@ def solve_poisson(
     On the unit sphere -Delta z = 2 z:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
     >>> z = points[:, 2]
-    >>> laplacian = core.build_laplacian(points)
-    >>> solution = core.solve_poisson(laplacian, 2 * z)
+    >>> laplacian = mf.build_laplacian(points)
+    >>> solution = mf.solve_poisson(laplacian, 2 * z)
     >>> print(np.abs(solution - z).max().round(2))
     0.0
     """
@@ -175,10 +175,10 @@ def harmonic_field(
     One at a pole and minus one at the other gives zero at the equator:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> laplacian = core.build_laplacian(points)
-    >>> field = core.harmonic_field(laplacian, [0, 799], [1, -1])
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> laplacian = mf.build_laplacian(points)
+    >>> field = mf.harmonic_field(laplacian, [0, 799], [1, -1])
     >>> print(field[[0, 400, 799]].round(1))
     [ 1.  0. -1.]
     """

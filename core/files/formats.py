@@ -231,9 +231,9 @@ def write_pieces(path: FilePath, tables: Callable[[], Iterable[PointTable]]) -> 
     Examples
     --------
     >>> import pathlib, tempfile
-    >>> import core
-    >>> from core.files import PointTable, read_points, write_pieces
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> from meshfree_laplacian.files import PointTable, read_points, write_pieces
+    >>> points = mf.example_sphere()
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = pathlib.Path(folder, "sphere.ply")
     ...     write_pieces(path, lambda: [PointTable(points[:500]), PointTable(points[500:])])

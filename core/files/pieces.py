@@ -180,11 +180,11 @@ def chunks(
     Examples
     --------
     >>> import pathlib, tempfile
-    >>> import core
-    >>> from core.files import PointTable, chunks, write_points
+    >>> import meshfree_laplacian as mf
+    >>> from meshfree_laplacian.files import PointTable, chunks, write_points
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = pathlib.Path(folder, "sphere.ply")
-    ...     write_points(path, PointTable(core.example_sphere()))
+    ...     write_points(path, PointTable(mf.example_sphere()))
     ...     print([len(points) for points, attributes in chunks(path, 300)])
     []
     [300, 300, 200]

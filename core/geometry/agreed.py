@@ -66,11 +66,11 @@ class Agreed(Frozen):
     The upper half of a sphere, with a halo, as it is within the whole sphere:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> whole = core.build_laplacian(points)
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> whole = mf.build_laplacian(points)
     >>> rows = np.flatnonzero(points[:, 2] > -0.8)
-    >>> part = core.build_laplacian(points[rows], agreed=whole.agreed.among(rows, len(points)))
+    >>> part = mf.build_laplacian(points[rows], agreed=whole.agreed.among(rows, len(points)))
     >>> inner = points[rows, 2] > 0.8
     >>> print(np.abs(part.normals - whole.normals[rows])[inner].max().round(9))
     0.0

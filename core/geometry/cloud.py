@@ -674,9 +674,9 @@ def estimate_normals(points: ArrayLike, options: LaplacianOptions = LaplacianOpt
     On the unit sphere they are the points themselves:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> print(np.abs(core.estimate_normals(points) - points).max().round(2))
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> print(np.abs(mf.estimate_normals(points) - points).max().round(2))
     0.0
     """
     check_options(options)
@@ -753,9 +753,9 @@ def surface_discs(points: ArrayLike, *, progress: Progress | None = None) -> Dis
     On the unit sphere with 800 points, whose spacing is ``sqrt(4 pi / 800)``, 0.13:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> discs = core.surface_discs(points)
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> discs = mf.surface_discs(points)
     >>> print(discs.radii.mean().round(2), np.abs(discs.normals - points).max().round(2))
     0.08 0.0
     """

@@ -45,13 +45,13 @@ class Doubt(IntEnum):
     None of the results on a well sampled sphere are in doubt; many on points throughout a cube are, for one cause:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> print(core.build_laplacian(points).doubt.max())
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> print(mf.build_laplacian(points).doubt.max())
     0
     >>> points = np.random.default_rng(0).uniform(-1.0, 1.0, (2000, 3))
-    >>> doubt = core.build_laplacian(points).doubt
-    >>> print(core.Doubt(np.bincount(doubt[doubt > 0]).argmax()).name)
+    >>> doubt = mf.build_laplacian(points).doubt
+    >>> print(mf.Doubt(np.bincount(doubt[doubt > 0]).argmax()).name)
     VOLUME
     """
 

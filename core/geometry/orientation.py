@@ -91,12 +91,12 @@ def orient_normals(
     Normals of the unit sphere with random signs, and the same as seen from a place within:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
     >>> given = points * np.random.default_rng(0).choice([-1, 1], (800, 1))
-    >>> print(np.abs(core.orient_normals(points, given) - points).max().round(6))
+    >>> print(np.abs(mf.orient_normals(points, given) - points).max().round(6))
     0.0
-    >>> inner = core.orient_normals(points, given, method="viewpoint", viewpoint=[0, 0, 0.5])
+    >>> inner = mf.orient_normals(points, given, method="viewpoint", viewpoint=[0, 0, 0.5])
     >>> print(np.abs(inner + points).max().round(6))
     0.0
     """

@@ -61,11 +61,11 @@ class Prolongation:
     Examples
     --------
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> subset = core.blue_noise_subset(points, 300)
-    >>> laplacian = core.build_laplacian(points[subset])
-    >>> every = core.Prolongation(points, subset, laplacian.normals)
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> subset = mf.blue_noise_subset(points, 300)
+    >>> laplacian = mf.build_laplacian(points[subset])
+    >>> every = mf.Prolongation(points, subset, laplacian.normals)
     >>> print(np.isclose(every.shares(laplacian.areas).sum(), laplacian.areas.sum()))
     True
     >>> print(np.abs(every.interpolate(points[subset, 2]) - points[:, 2]).max() < 0.03)

@@ -57,9 +57,9 @@ def blue_noise_subset(points: ArrayLike, count: int, *, progress: Report | None 
     Examples
     --------
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> print(180 <= len(core.blue_noise_subset(points, 200)) <= 200)
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> print(180 <= len(mf.blue_noise_subset(points, 200)) <= 200)
     True
     """
     report = progress or (lambda: None)

@@ -64,9 +64,9 @@ def estimate_areas(
     The area of the unit sphere is 4 pi:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> areas = core.estimate_areas(points)
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> areas = mf.estimate_areas(points)
     >>> print(areas.shape, areas.sum().round(1))
     (800,) 12.6
     """

@@ -47,10 +47,10 @@ def gradient_matrix(laplacian: LaplaceBeltrami) -> sparse.csr_array:
     The gradient of z on the unit sphere is the axis without its part along the normal:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> laplacian = core.build_laplacian(points)
-    >>> gradient = (core.gradient_matrix(laplacian) @ points[:, 2]).reshape(-1, 3)
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> laplacian = mf.build_laplacian(points)
+    >>> gradient = (mf.gradient_matrix(laplacian) @ points[:, 2]).reshape(-1, 3)
     >>> print(np.abs(gradient - ([0, 0, 1] - points[:, 2:] * points)).max() < 0.02)
     True
     """
@@ -98,11 +98,11 @@ def divergence_matrix(laplacian: LaplaceBeltrami) -> sparse.csr_array:
     On the unit sphere, the gradient of z diverges as -2 z:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> laplacian = core.build_laplacian(points)
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> laplacian = mf.build_laplacian(points)
     >>> z = points[:, 2]
-    >>> divergence = core.divergence_matrix(laplacian) @ core.gradient_matrix(laplacian) @ z
+    >>> divergence = mf.divergence_matrix(laplacian) @ mf.gradient_matrix(laplacian) @ z
     >>> print(np.abs(divergence + 2 * z).max() < 0.1)
     True
     """

@@ -174,10 +174,10 @@ class LaplaceBeltrami(Frozen):
         A sphere seen from within is hollow:
 
         >>> import numpy as np
-        >>> import core
-        >>> points = core.example_sphere()
-        >>> inner = core.build_laplacian(points).toward(-points)
-        >>> print(core.mean_curvature(inner).mean().round(2))
+        >>> import meshfree_laplacian as mf
+        >>> points = mf.example_sphere()
+        >>> inner = mf.build_laplacian(points).toward(-points)
+        >>> print(mf.mean_curvature(inner).mean().round(2))
         -1.0
         """
         given = check_values(directions, len(self.normals))
@@ -224,10 +224,10 @@ class LaplaceBeltrami(Frozen):
         On the unit sphere the Laplacian of a coordinate is -2 times it:
 
         >>> import numpy as np
-        >>> import core
-        >>> points = core.example_sphere()
+        >>> import meshfree_laplacian as mf
+        >>> points = mf.example_sphere()
         >>> z = points[:, 2]
-        >>> laplacian = core.build_laplacian(points)
+        >>> laplacian = mf.build_laplacian(points)
         >>> print(np.abs(laplacian.apply(z) + 2 * z).max().round(1))
         0.0
         """
@@ -294,9 +294,9 @@ class LaplaceBeltrami(Frozen):
         On the unit sphere ``l (l + 1)`` is an eigenvalue 2 l + 1 times:
 
         >>> import numpy as np
-        >>> import core
-        >>> points = core.example_sphere()
-        >>> laplacian = core.build_laplacian(points)
+        >>> import meshfree_laplacian as mf
+        >>> points = mf.example_sphere()
+        >>> laplacian = mf.build_laplacian(points)
         >>> print(laplacian.eigenpairs(9).eigenvalues.round(1))
         [0. 2. 2. 2. 6. 6. 6. 6. 6.]
         """
@@ -390,9 +390,9 @@ def build_laplacian(
     The unit sphere has the area 4 pi and no boundary, and its modes after the constant one the eigenvalue 2:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> laplacian = core.build_laplacian(points)
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> laplacian = mf.build_laplacian(points)
     >>> print(laplacian.areas.sum().round(1), laplacian.boundary.any(), laplacian.notices)
     12.6 False []
     >>> print(laplacian.eigenpairs(4).eigenvalues.round(1))

@@ -67,10 +67,10 @@ def mean_curvature(laplacian: LaplaceBeltrami) -> Floats:
     It is one everywhere on the unit sphere:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> laplacian = core.build_laplacian(points)
-    >>> curvature = core.mean_curvature(laplacian)
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> laplacian = mf.build_laplacian(points)
+    >>> curvature = mf.mean_curvature(laplacian)
     >>> print(curvature.min().round(1), curvature.max().round(1))
     1.0 1.0
     """
@@ -99,10 +99,10 @@ def measure_mean_curvature(laplacian: LaplaceBeltrami) -> MeanCurvature:
     everywhere:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
     >>> noise = 0.013 * np.random.default_rng(0).normal(size=(len(points), 1))
-    >>> found = core.measure_mean_curvature(core.build_laplacian(points * (1.0 + noise)))
+    >>> found = mf.measure_mean_curvature(mf.build_laplacian(points * (1.0 + noise)))
     >>> print(found.values.mean().round(1), found.scatter.mean() < 0.1, found.notices)
     1.0 True []
     """
@@ -204,9 +204,9 @@ def principal_curvatures(laplacian: LaplaceBeltrami) -> PrincipalCurvatures:
     On the unit sphere, a cap everywhere, both are one:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> curvatures = core.principal_curvatures(core.build_laplacian(points))
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> curvatures = mf.principal_curvatures(mf.build_laplacian(points))
     >>> print(curvatures.first.mean().round(1), curvatures.second.mean().round(1))
     1.0 1.0
     >>> print(curvatures.shape_index.mean().round(1))

@@ -79,9 +79,9 @@ def build_laplacian(
     The total is the area of the unit sphere, 4 pi:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> print(core.paper.build_laplacian(points).areas.sum().round(2))
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> print(mf.paper.build_laplacian(points).areas.sum().round(2))
     12.57
     """
     report = progress or (lambda stage, fraction: None)

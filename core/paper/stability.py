@@ -80,10 +80,10 @@ def check_stability(laplacian: LaplaceBeltrami) -> Stability:
     A closed surface of one component, where only constants have no Laplacian:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> laplacian = core.build_laplacian(points)
-    >>> stability = core.check_stability(laplacian)
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> laplacian = mf.build_laplacian(points)
+    >>> stability = mf.check_stability(laplacian)
     >>> print(stability.components, stability.row_sum < 1e-12, stability.concerns())
     1 True []
     """

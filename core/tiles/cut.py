@@ -73,9 +73,9 @@ def cut(points: ArrayLike, count: int, halo: float = HALO) -> list[Tile]:
 
     Examples
     --------
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> print([len(tile.own) for tile in core.tiles.cut(points, 4)])
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> print([len(tile.own) for tile in mf.tiles.cut(points, 4)])
     [200, 200, 200, 200]
     """
     points = check_points(points)

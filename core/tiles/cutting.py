@@ -70,7 +70,7 @@ def cut_to_store(
     viewpoint : array_like, (3,), optional
         For 'viewpoint': one place [L]; else that of the column "scanner" at each point.
     wavelength : float, optional
-        Of the roughness [L], see `core.roughness`; zero for the usual one. If not given, there is no roughness.
+        Of the roughness [L], see `mf.roughness`; zero for the usual one. If not given, there is no roughness.
     memory : int, optional
         Bytes that a tile may take: larger ones are left out, with an error.
     workers : int
@@ -91,10 +91,10 @@ def cut_to_store(
     Examples
     --------
     >>> import tempfile
-    >>> import core
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     store = core.tiles.cut_to_store(lambda: [(points, {})], folder + "/store", 200)
+    ...     store = mf.tiles.cut_to_store(lambda: [(points, {})], folder + "/store", 200)
     ...     print([len(store.own(number)) for number in range(store.count)])
     [200, 200, 200, 200]
     """

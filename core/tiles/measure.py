@@ -30,7 +30,7 @@ class Measured(Frozen):
     surface_points
         As of `LaplaceBeltrami`.
     mean_curvature : ndarray, (k,)
-        See `core.mean_curvature`.
+        See `mf.mean_curvature`.
     component : ndarray, (k,) int
         By the numbers that all tiles agree on; -1 for points left out.
     stiffness : csr_array, (k, n)
@@ -90,11 +90,11 @@ def measure_tile(
 
     Examples
     --------
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> tiles = core.tiles.cut(points, 2)
-    >>> agreed = core.tiles.survey(points, tiles)
-    >>> parts = [core.tiles.measure_tile(points, tile, agreed) for tile in tiles]
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> tiles = mf.tiles.cut(points, 2)
+    >>> agreed = mf.tiles.survey(points, tiles)
+    >>> parts = [mf.tiles.measure_tile(points, tile, agreed) for tile in tiles]
     >>> print(sum(part.areas.sum() for part in parts).round(1))
     12.6
     """

@@ -89,11 +89,11 @@ def run_steps(
     Examples
     --------
     >>> import tempfile
-    >>> import core
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     store = core.tiles.cut_to_store(lambda: [(points, {})], folder + "/store", 400)
-    ...     core.tiles.run_steps(store)
+    ...     store = mf.tiles.cut_to_store(lambda: [(points, {})], folder + "/store", 400)
+    ...     mf.tiles.run_steps(store)
     ...     area = sum(store.read("measure", number, "areas").sum() for number in store.alive)
     >>> print(area.round(1))
     12.6

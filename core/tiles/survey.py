@@ -67,10 +67,10 @@ def survey(
 
     Examples
     --------
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> tiles = core.tiles.cut(points, 2)
-    >>> agreed = core.tiles.survey(points, tiles)
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> tiles = mf.tiles.cut(points, 2)
+    >>> agreed = mf.tiles.survey(points, tiles)
     >>> print(round(agreed.scale, 3), agreed.component.max(), agreed.noisy)
     1.0 0 False
     """

@@ -62,10 +62,10 @@ def clean_points(
     Radii that scatter by 0.02 scatter by a third of that afterwards:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
     >>> noisy = points * np.random.default_rng(0).normal(1, 0.02, (800, 1))
-    >>> clean = core.clean_points(core.build_laplacian(noisy))
+    >>> clean = mf.clean_points(mf.build_laplacian(noisy))
     >>> print(np.linalg.norm(clean, axis=1).std() < 0.007)
     True
     """

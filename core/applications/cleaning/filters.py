@@ -192,12 +192,12 @@ def spectral_filter(
     On the unit sphere z is a mode of eigenvalue 2, and x y of eigenvalue 6, which the first four modes do not hold:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
     >>> z = points[:, 2]
-    >>> laplacian = core.build_laplacian(points)
+    >>> laplacian = mf.build_laplacian(points)
     >>> values = z + points[:, 0] * points[:, 1]
-    >>> smooth = core.spectral_filter(values, laplacian.eigenpairs(9), laplacian.areas, 4)
+    >>> smooth = mf.spectral_filter(values, laplacian.eigenpairs(9), laplacian.areas, 4)
     >>> print(np.abs(smooth - z).max().round(2))
     0.0
     """

@@ -101,13 +101,13 @@ def smooth_points(
     exp(-0.2), unless its area is kept:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> laplacian = core.build_laplacian(points)
-    >>> smaller = core.smooth_points(laplacian, core.exponential(0.1))
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> laplacian = mf.build_laplacian(points)
+    >>> smaller = mf.smooth_points(laplacian, mf.exponential(0.1))
     >>> print(np.linalg.norm(smaller, axis=1).mean().round(2))
     0.82
-    >>> same = core.smooth_points(laplacian, core.exponential(0.1), keep="area")
+    >>> same = mf.smooth_points(laplacian, mf.exponential(0.1), keep="area")
     >>> print(np.linalg.norm(same, axis=1).mean().round(2))
     1.0
     """
@@ -198,10 +198,10 @@ def fair_points(
     Radii that scatter by 0.02 scatter by a quarter of that afterwards:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
     >>> noisy = points * np.random.default_rng(0).normal(1, 0.02, (800, 1))
-    >>> smooth = core.fair_points(core.build_laplacian(noisy))
+    >>> smooth = mf.fair_points(mf.build_laplacian(noisy))
     >>> print(np.linalg.norm(noisy, axis=1).std().round(3), np.linalg.norm(smooth, axis=1).std().round(3))
     0.02 0.005
     """
@@ -257,10 +257,10 @@ def roughness(
     One point of the unit sphere is 0.02 too far out:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
     >>> points[400] *= 1.02
-    >>> rough = core.roughness(core.build_laplacian(points))
+    >>> rough = mf.roughness(mf.build_laplacian(points))
     >>> print(np.argmax(np.abs(rough)), rough[400].round(2))
     400 0.02
     """
@@ -316,11 +316,11 @@ def displace_by_mode(
     The height is a mode of the unit sphere. It moves both poles up by 0.2, one of them outwards and the other inwards:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
     >>> z = points[:, 2]
-    >>> laplacian = core.build_laplacian(points)
-    >>> moved = core.displace_by_mode(laplacian, z, 0.2)
+    >>> laplacian = mf.build_laplacian(points)
+    >>> moved = mf.displace_by_mode(laplacian, z, 0.2)
     >>> print(moved[:, 2].min().round(1), moved[:, 2].max().round(1))
     -0.8 1.2
     """

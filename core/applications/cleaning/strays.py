@@ -56,9 +56,9 @@ class Strays:
     Examples
     --------
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> strays = core.Strays(np.concatenate([points, [[0.0, 0.0, 1.5]]]))
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> strays = mf.Strays(np.concatenate([points, [[0.0, 0.0, 1.5]]]))
     >>> print(np.flatnonzero(strays.chosen()), strays.scores[800] > 2.0, strays.part_counts[0])
     [800] True 800
     """
@@ -182,10 +182,10 @@ def stray_points(
     Examples
     --------
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
     >>> cloud = np.concatenate([points, 1.4 * points[::100]])
-    >>> print(np.flatnonzero(core.stray_points(cloud)))
+    >>> print(np.flatnonzero(mf.stray_points(cloud)))
     [800 801 802 803 804 805 806 807]
     """
     return Strays(points, progress=progress).chosen(strictness, smallest=smallest, smallest_area=smallest_area)

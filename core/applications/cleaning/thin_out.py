@@ -75,11 +75,11 @@ def thin_out(
     Examples
     --------
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> few = points[core.thin_out(points, spacing=0.3)]
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> few = points[mf.thin_out(points, spacing=0.3)]
     >>> apart = np.linalg.norm(few[:, None] - few, axis=2) + 9.0 * np.eye(len(few))
-    >>> print(apart.min() >= 0.3, len(core.thin_out(points, count=100)) <= 100)
+    >>> print(apart.min() >= 0.3, len(mf.thin_out(points, count=100)) <= 100)
     True True
     """
     report = progress or (lambda stage, fraction: None)

@@ -30,7 +30,7 @@ def thin_pieces(pieces: Iterable[Piece], count: int, *, progress: Report | None 
     Parameters
     ----------
     pieces : iterable of (array_like, dict of str to ndarray)
-        Coordinates, (k, 3) [L], and other numbers by name, (k,) or (k, m), as of `core.files.chunks`.
+        Coordinates, (k, 3) [L], and other numbers by name, (k,) or (k, m), as of `mf.files.chunks`.
     count : int
         How many points to choose at most.
     progress : callable, optional
@@ -54,10 +54,10 @@ def thin_pieces(pieces: Iterable[Piece], count: int, *, progress: Report | None 
     Examples
     --------
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
     >>> pieces = [(piece, {}) for piece in np.split(points, [300])]
-    >>> few = core.thin_pieces(pieces, 100)
+    >>> few = mf.thin_pieces(pieces, 100)
     >>> print(90 <= sum(len(chosen) for chosen, numbers in few) <= 100)
     True
     """

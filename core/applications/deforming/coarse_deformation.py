@@ -74,11 +74,11 @@ class CoarseDeformer(HandleSolver):
     Half of the points, or far fewer of many, suffice where the cap at one pole is lifted, and that at the other stays:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
     >>> z = points[:, 2]
-    >>> laplacian = core.build_laplacian(points)
-    >>> deformer = core.CoarseDeformer(laplacian, z > 0.8, z < -0.8, count=400)
+    >>> laplacian = mf.build_laplacian(points)
+    >>> deformer = mf.CoarseDeformer(laplacian, z > 0.8, z < -0.8, count=400)
     >>> moved = deformer.solve(points[deformer.handles] + [0, 0, 1])
     >>> print((moved - points)[[0, 799], 2].round(2), (moved - points)[:, 2].mean().round(1))
     [1. 0.] 0.5

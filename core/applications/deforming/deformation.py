@@ -199,11 +199,11 @@ class Deformer(HandleSolver):
     The cap at one pole is lifted by one, that at the other stays, and all follow, by a half on average:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
     >>> z = points[:, 2]
-    >>> laplacian = core.build_laplacian(points)
-    >>> deformer = core.Deformer(laplacian, z > 0.8, z < -0.8)
+    >>> laplacian = mf.build_laplacian(points)
+    >>> deformer = mf.Deformer(laplacian, z > 0.8, z < -0.8)
     >>> moved = deformer.solve(points[deformer.handles] + [0, 0, 1])
     >>> print((moved - points)[[0, 799], 2].round(2), (moved - points)[:, 2].mean().round(2))
     [1. 0.] 0.5

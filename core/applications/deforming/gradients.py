@@ -112,11 +112,11 @@ def deformation_gradients(laplacian: LaplaceBeltrami, positions: ArrayLike) -> F
     A sphere stretched to twice its length along z: steps along its equator stay, those across it double.
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
     >>> z = points[:, 2]
-    >>> laplacian = core.build_laplacian(points)
-    >>> gradients = core.deformation_gradients(laplacian, points * [1, 1, 2])
+    >>> laplacian = mf.build_laplacian(points)
+    >>> gradients = mf.deformation_gradients(laplacian, points * [1, 1, 2])
     >>> print(np.median(gradients[abs(z) < 0.05, 2, 2]).round(1))
     2.0
     """

@@ -160,10 +160,10 @@ def minimal_surface(
     A cushion over a square of area four becomes flat while its boundary is fixed:
 
     >>> import numpy as np
-    >>> import core
+    >>> import meshfree_laplacian as mf
     >>> x, y = np.mgrid[-1:1:21j, -1:1:21j].reshape(2, -1)
     >>> points = np.column_stack([x, y, 0.5 * (1 - x**2) * (1 - y**2)])
-    >>> film = core.minimal_surface(points, np.maximum(np.abs(x), np.abs(y)) == 1)
+    >>> film = mf.minimal_surface(points, np.maximum(np.abs(x), np.abs(y)) == 1)
     >>> print(film.converged, round(film.initial_area, 1), film.areas.sum().round(1))
     True 4.6 4.0
     """

@@ -54,10 +54,10 @@ def falloff(distance: ArrayLike, radius: float, shape: str = "smooth") -> Floats
     A quarter of the way around the unit sphere, and half of it:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> distance = core.geodesic_distance(core.build_laplacian(points), [0])
-    >>> weights = core.falloff(distance, np.pi / 2)
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> distance = mf.geodesic_distance(mf.build_laplacian(points), [0])
+    >>> weights = mf.falloff(distance, np.pi / 2)
     >>> print(weights[[0, 400, 799]].round(1))
     [1. 0. 0.]
     """

@@ -77,10 +77,10 @@ def geodesic_distance(laplacian: LaplaceBeltrami, sources: ArrayLike, *, progres
     From the first point, next to a pole, to the one farthest from it, nearly pi away on the unit sphere:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> laplacian = core.build_laplacian(points)
-    >>> distance = core.geodesic_distance(laplacian, [0])
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> laplacian = mf.build_laplacian(points)
+    >>> distance = mf.geodesic_distance(laplacian, [0])
     >>> print(distance.max().round(1), np.arccos((points @ points[0]).min()).round(1))
     3.1 3.1
     """
@@ -107,9 +107,9 @@ class Geodesics:
     From both ends of the polar axis of the unit sphere to a point of the equator, a quarter of the way around:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> geodesics = core.Geodesics(core.build_laplacian(points))
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> geodesics = mf.Geodesics(mf.build_laplacian(points))
     >>> print(*(geodesics.distance([pole])[400].round(1) for pole in (0, 799)))
     1.6 1.6
     """
@@ -385,10 +385,10 @@ def nearest_source(laplacian: LaplaceBeltrami, sources: ArrayLike, *, progress: 
     From both poles of a sphere, each is nearest to one half:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
     >>> z = points[:, 2]
-    >>> label = core.nearest_source(core.build_laplacian(points), [0, 799])
+    >>> label = mf.nearest_source(mf.build_laplacian(points), [0, 799])
     >>> print(label[z > 0.1].max(), label[z < -0.1].min())
     0 1
     """
@@ -439,9 +439,9 @@ def signed_distance(
     From three points around the pole of the unit sphere, the poles are on either side:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> distance = core.signed_distance(core.build_laplacian(points), [100, 101, 102], closed=True)
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> distance = mf.signed_distance(mf.build_laplacian(points), [100, 101, 102], closed=True)
     >>> print(np.sign(distance[0] * distance[799]))
     -1.0
     """

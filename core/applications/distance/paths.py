@@ -75,10 +75,10 @@ def geodesic_path(
     From one pole of the unit sphere to the point that is farthest from it, nearly pi away:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> path = core.geodesic_path(core.build_laplacian(points), 0, 799)
-    >>> print((core.polygon_length(path) / np.arccos(points[0] @ points[799])).round(2))
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> path = mf.geodesic_path(mf.build_laplacian(points), 0, 799)
+    >>> print((mf.polygon_length(path) / np.arccos(points[0] @ points[799])).round(2))
     1.0
     """
     report = progress or (lambda stage, fraction: None)
@@ -120,9 +120,9 @@ def polygon_length(corners: ArrayLike) -> float:
     From one pole of the unit sphere straight to the other:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> print(round(core.polygon_length(points[[0, 799]]), 1))
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> print(round(mf.polygon_length(points[[0, 799]]), 1))
     2.0
     """
     advice = "Give x, y, z of each corner."

@@ -49,10 +49,10 @@ def grow(laplacian: LaplaceBeltrami, chosen: ArrayLike, distance: float) -> Bool
     A cap of the unit sphere that ends pi / 3 from its pole is a quarter of it:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> laplacian = core.build_laplacian(points)
-    >>> print(core.grow(laplacian, [0], np.pi / 3).mean().round(2))
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> laplacian = mf.build_laplacian(points)
+    >>> print(mf.grow(laplacian, [0], np.pi / 3).mean().round(2))
     0.25
     """
     mask = as_mask(chosen, len(laplacian.points))
@@ -98,9 +98,9 @@ def front_point(points: ArrayLike, eye: ArrayLike, direction: ArrayLike, reach: 
     From above one sees the upper pole of the unit sphere, not the lower one:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> seen = core.front_point(points, eye=[0, 0, 5], direction=[0, 0, -1], reach=0.25)
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> seen = mf.front_point(points, eye=[0, 0, 5], direction=[0, 0, -1], reach=0.25)
     >>> print(points[seen, 2].round(1))
     1.0
     """
@@ -158,10 +158,10 @@ def opposite_ends(laplacian: LaplaceBeltrami, share: float = 0.03) -> tuple[Ints
     On the unit sphere opposite ends are caps around opposite points:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> laplacian = core.build_laplacian(points)
-    >>> one, other = core.opposite_ends(laplacian, share=0.05)
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> laplacian = mf.build_laplacian(points)
+    >>> one, other = mf.opposite_ends(laplacian, share=0.05)
     >>> print((points[one].mean(axis=0) @ points[other].mean(axis=0)).round(1))
     -0.9
     """

@@ -60,10 +60,10 @@ def transport(
     From near the pole of the unit sphere a direction is transported to the equator along meridians:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> laplacian = core.build_laplacian(points)
-    >>> direction = core.transport(laplacian, [0], [1, 0, 0])
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> laplacian = mf.build_laplacian(points)
+    >>> direction = mf.transport(laplacian, [0], [1, 0, 0])
     >>> ahead = np.argmax(points[:, 0])
     >>> print(np.abs(direction[ahead, 2]).round(1))
     1.0
@@ -101,9 +101,9 @@ class Transport:
     Opposite directions stay opposite:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> field = core.Transport(core.build_laplacian(points))
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> field = mf.Transport(mf.build_laplacian(points))
     >>> print(np.abs(field.extend([0], [1, 0, 0]) + field.extend([0], [-1, 0, 0])).max().round(6))
     0.0
     """
@@ -264,9 +264,9 @@ def logarithmic_map(
     From a pole of the unit sphere, all points lie within a disc of radius pi:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> place = core.logarithmic_map(core.build_laplacian(points), 0)
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> place = mf.logarithmic_map(mf.build_laplacian(points), 0)
     >>> print(place[0], np.hypot(*place.T).max().round(1))
     [0. 0.] 3.1
     """

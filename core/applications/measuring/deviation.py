@@ -89,12 +89,12 @@ def surface_deviation(
     A sphere of 300 points and radius 1.1 is 0.1 outside of the unit sphere of 800 points:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> deviation = core.surface_deviation(1.1 * points[::2], points[::2], core.build_laplacian(points))
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> deviation = mf.surface_deviation(1.1 * points[::2], points[::2], mf.build_laplacian(points))
     >>> print(np.allclose(deviation.distance, 0.1, atol=1e-3), deviation.known.all())
     True True
-    >>> inside = core.surface_deviation(0.9 * points[::2], None, core.build_laplacian(points))
+    >>> inside = mf.surface_deviation(0.9 * points[::2], None, mf.build_laplacian(points))
     >>> print(np.allclose(inside.distance, 0.1, atol=1e-3))
     True
     """
@@ -143,13 +143,13 @@ def outer_sides(laplacian: LaplaceBeltrami) -> Floats:
     Normals of a sphere point outwards; of a wall nothing tells where that is:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> print(core.outer_sides(core.build_laplacian(points)).min())
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> print(mf.outer_sides(mf.build_laplacian(points)).min())
     1.0
     >>> wall = np.zeros((400, 3))
     >>> wall[:, ::2] = np.random.default_rng(0).random((400, 2))
-    >>> print(np.abs(core.outer_sides(core.build_laplacian(wall))).max())
+    >>> print(np.abs(mf.outer_sides(mf.build_laplacian(wall))).max())
     0.0
     """
     kept = np.flatnonzero(laplacian.component >= 0)
@@ -187,11 +187,11 @@ def sides_beside(laplacian: LaplaceBeltrami, sides: ArrayLike, points: ArrayLike
     Above and below a sphere, normals upwards point out of it and into it:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> laplacian = core.build_laplacian(points)
-    >>> sides = core.outer_sides(laplacian)
-    >>> print(core.sides_beside(laplacian, sides, [[0, 0, 1.5], [0, 0, -1.5]], np.tile([0, 0, 1], (2, 1))))
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> laplacian = mf.build_laplacian(points)
+    >>> sides = mf.outer_sides(laplacian)
+    >>> print(mf.sides_beside(laplacian, sides, [[0, 0, 1.5], [0, 0, -1.5]], np.tile([0, 0, 1], (2, 1))))
     [ 1. -1.]
     """
     points = check_points(points)

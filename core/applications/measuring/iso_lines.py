@@ -64,10 +64,10 @@ def iso_lines(vertices: ArrayLike, faces: ArrayLike, values: ArrayLike, levels: 
     A circle of latitude, where the height is a half:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> mesh = core.mesh_surface(core.build_laplacian(points))
-    >>> (circle,) = core.iso_lines(mesh.vertices, mesh.faces, mesh.vertices[:, 2], [0.5])
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> mesh = mf.mesh_surface(mf.build_laplacian(points))
+    >>> (circle,) = mf.iso_lines(mesh.vertices, mesh.faces, mesh.vertices[:, 2], [0.5])
     >>> steps = circle.points - np.roll(circle.points, 1, axis=0)
     >>> print(circle.closed, (np.linalg.norm(steps, axis=1).sum() / (np.pi * np.sqrt(3))).round(2))
     True 1.0

@@ -85,9 +85,9 @@ def measure_parts(
     Both halves of the unit sphere have the area 2 pi:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> found = core.measure_parts(core.build_laplacian(points), (points[:, 2] > 0).astype(int))
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> found = mf.measure_parts(mf.build_laplacian(points), (points[:, 2] > 0).astype(int))
     >>> print((found.areas / np.pi).round(1), found.points)
     [2. 2.] [400 400]
     """
@@ -138,9 +138,9 @@ def part_means(laplacian: LaplaceBeltrami, values: ArrayLike, labels: ArrayLike 
     The squared height over the unit sphere is 1 / 3 on average:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> print(core.part_means(core.build_laplacian(points), points[:, 2] ** 2)[0].round(2))
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> print(mf.part_means(mf.build_laplacian(points), points[:, 2] ** 2)[0].round(2))
     [0.33]
     """
     count = len(laplacian.points)

@@ -96,13 +96,13 @@ def pile_volume(
     Half of the unit ball, 2 pi / 3, and with a cylinder of height 1 below it, 5 pi / 3:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> laplacian = core.build_laplacian(points)
-    >>> found = core.pile_volume(laplacian, points[:, 2] > 0)
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> laplacian = mf.build_laplacian(points)
+    >>> found = mf.pile_volume(laplacian, points[:, 2] > 0)
     >>> print(round(found.above, 1), found.below < 0.1)
     2.1 True
-    >>> found = core.pile_volume(laplacian, points[:, 2] > 0, plane=([0, 0, -1], [0, 0, 1]))
+    >>> found = mf.pile_volume(laplacian, points[:, 2] > 0, plane=([0, 0, -1], [0, 0, 1]))
     >>> print(round(found.above, 1), found.below)
     5.2 0.0
     """

@@ -74,11 +74,11 @@ def profile(laplacian: LaplaceBeltrami, path: ArrayLike, values: ArrayLike) -> P
     The height along a way over the unit sphere, from its values at the points:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> laplacian = core.build_laplacian(points)
-    >>> path = core.geodesic_path(laplacian, 0, 400)
-    >>> found = core.profile(laplacian, path, points[:, 2])
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> laplacian = mf.build_laplacian(points)
+    >>> path = mf.geodesic_path(laplacian, 0, 400)
+    >>> found = mf.profile(laplacian, path, points[:, 2])
     >>> print(np.abs(found.values - path[:, 2]).max() < 0.02)
     True
     """

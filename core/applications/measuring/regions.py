@@ -117,11 +117,11 @@ class SurfaceMeasures:
     Both halves of the unit sphere have the area 2 pi:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> laplacian = core.build_laplacian(points)
-    >>> measures = core.SurfaceMeasures(laplacian)
-    >>> halves = [core.measure_region(laplacian, side * points[:, 2] > 0, measures=measures) for side in (1, -1)]
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> laplacian = mf.build_laplacian(points)
+    >>> measures = mf.SurfaceMeasures(laplacian)
+    >>> halves = [mf.measure_region(laplacian, side * points[:, 2] > 0, measures=measures) for side in (1, -1)]
     >>> print([round(half.area / np.pi, 1) for half in halves])
     [2.0, 2.0]
     """
@@ -234,9 +234,9 @@ def measure_region(
     A hemisphere of the unit sphere has the area 2 pi, and its boundary is as long:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> found = core.measure_region(core.build_laplacian(points), points[:, 2] > 0)
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> found = mf.measure_region(mf.build_laplacian(points), points[:, 2] > 0)
     >>> print(round(found.area / np.pi, 1), round(found.boundary_length / np.pi, 1))
     2.0 2.0
     """

@@ -122,9 +122,9 @@ def cross_section(
     Half above its middle, the section of the unit sphere is a circle of radius sqrt(3 / 4):
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> found = core.cross_section(core.build_laplacian(points), [0, 0, 0.5], [0, 0, 1])
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> found = mf.cross_section(mf.build_laplacian(points), [0, 0, 0.5], [0, 0, 1])
     >>> print(len(found.curves), round(found.enclosed_area / np.pi, 2))
     1 0.75
     """

@@ -51,10 +51,10 @@ class Slopes:
     The height above the equator of a sphere climbs by one per length there, and not at all at the poles:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
     >>> z = points[:, 2]
-    >>> slopes = core.Slopes(points, core.surface_discs(points)).of(z)
+    >>> slopes = mf.Slopes(points, mf.surface_discs(points)).of(z)
     >>> print(slopes[abs(z) < 0.1].mean(axis=0).round(1) + 0.0)
     [0. 0. 1.]
     """

@@ -37,9 +37,9 @@ def surface_variation(laplacian: LaplaceBeltrami) -> Floats:
     A flat ellipsoid is farthest from planes at its equator:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> variation = core.surface_variation(core.build_laplacian(points * [1.0, 1.0, 0.3]))
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> variation = mf.surface_variation(mf.build_laplacian(points * [1.0, 1.0, 0.3]))
     >>> equator = np.abs(points[:, 2]) < 0.1
     >>> print(variation[equator].min() > variation[~equator].mean())
     True

@@ -91,9 +91,9 @@ def enclosed_volume(
     The unit ball, 4 pi / 3:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> found = core.enclosed_volume(core.build_laplacian(points))
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> found = mf.enclosed_volume(mf.build_laplacian(points))
     >>> print(round(found.volume, 2), found.uncertainty < 0.2, found.openings)
     4.19 True [0]
     """

@@ -67,9 +67,9 @@ class Heat:
     On the unit sphere z is a mode of eigenvalue 2, so that it fades as ``exp(-2 t)``:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> heat = core.Heat(core.build_laplacian(points), 0.1)
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> heat = mf.Heat(mf.build_laplacian(points), 0.1)
     >>> warm = heat.advance(points[:, 2])
     >>> print((warm / points[:, 2]).mean().round(2), np.exp(-0.2).round(2))
     0.82 0.82
@@ -147,9 +147,9 @@ class Wave:
     On the unit sphere z swings with the frequency sqrt(2), so that after half a period it is reversed:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> wave = core.Wave(core.build_laplacian(points), np.pi / np.sqrt(2) / 10)
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> wave = mf.Wave(mf.build_laplacian(points), np.pi / np.sqrt(2) / 10)
     >>> state = points[:, 2], np.zeros(800)
     >>> for _ in range(10):
     ...     state = wave.advance(state)

@@ -67,11 +67,11 @@ def wave_modes(
     On the unit sphere z swings with the frequency sqrt(2), so that after half a period it is reversed:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
     >>> z = points[:, 2]
-    >>> laplacian = core.build_laplacian(points)
-    >>> wave = core.wave_modes(laplacian.eigenpairs(4), laplacian.areas, z, np.zeros(800))
+    >>> laplacian = mf.build_laplacian(points)
+    >>> wave = mf.wave_modes(laplacian.eigenpairs(4), laplacian.areas, z, np.zeros(800))
     >>> print(np.abs(wave(np.pi / np.sqrt(2)) + z).max().round(2))
     0.0
     """

@@ -105,10 +105,10 @@ def bone_weights(
     Two bones along the axis of the unit ball share its points by halves:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> laplacian = core.build_laplacian(points)
-    >>> weights = core.bone_weights(laplacian, [[0, 0, -0.8], [0, 0, 0]], [[0, 0, 0], [0, 0, 0.8]])
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> laplacian = mf.build_laplacian(points)
+    >>> weights = mf.bone_weights(laplacian, [[0, 0, -0.8], [0, 0, 0]], [[0, 0, 0], [0, 0, 0.8]])
     >>> print(weights[[0, 400, 799], 1].round(1), np.allclose(weights.sum(axis=1), 1))
     [1.  0.5 0. ] True
     """
@@ -168,9 +168,9 @@ def nearest_bones(points: ArrayLike, heads: ArrayLike, tails: ArrayLike) -> Floa
     Examples
     --------
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> weights = core.nearest_bones(points[[0, 799]], [[0, 0, -0.8], [0, 0, 0]], [[0, 0, 0], [0, 0, 0.8]])
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> weights = mf.nearest_bones(points[[0, 799]], [[0, 0, -0.8], [0, 0, 0]], [[0, 0, 0], [0, 0, 0.8]])
     >>> print(weights[:, 1])
     [1. 0.]
     """

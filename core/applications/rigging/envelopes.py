@@ -49,11 +49,11 @@ def envelope_share(
     A bone from the center of the unit sphere to its pole, and an envelope of half a unit that fades within another:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
     >>> heads, tails = np.zeros_like(points), np.zeros_like(points) + (0, 0, 1)
     >>> half = np.full(len(points), 0.5)
-    >>> found = core.envelope_share(points, heads, tails, half, half, half)
+    >>> found = mf.envelope_share(points, heads, tails, half, half, half)
     >>> print(found[[0, 200, 799]].round(1))
     [1.  0.5 0. ]
     """

@@ -80,11 +80,11 @@ def inpaint(
     The height over the unit sphere, known on two caps, is about the same between them:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
     >>> z = points[:, 2]
     >>> known = np.abs(z) > 0.4
-    >>> found = core.inpaint(core.build_laplacian(points), known, z[known])
+    >>> found = mf.inpaint(mf.build_laplacian(points), known, z[known])
     >>> print(np.abs(found - z).max() < 0.02, np.array_equal(found[known], z[known]))
     True True
     """
@@ -149,10 +149,10 @@ def inpaint_labels(laplacian: LaplaceBeltrami, known: ArrayLike, labels: ArrayLi
     Two caps of the unit sphere grow until they meet:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
     >>> known = np.abs(points[:, 2]) > 0.8
-    >>> found = core.inpaint_labels(core.build_laplacian(points), known, points[known, 2] > 0)
+    >>> found = mf.inpaint_labels(mf.build_laplacian(points), known, points[known, 2] > 0)
     >>> print((found == (points[:, 2] > 0)).mean() > 0.97)
     True
     """

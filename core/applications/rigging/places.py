@@ -119,10 +119,10 @@ def match_surface(
     All points of one sample of the unit sphere have a place on another one, between its points:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> source = core.build_laplacian(points)
-    >>> match = core.match_surface(core.build_laplacian(points[:, [1, 2, 0]]), source)
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> source = mf.build_laplacian(points)
+    >>> match = mf.match_surface(mf.build_laplacian(points[:, [1, 2, 0]]), source)
     >>> print(match.known.all(), match.distance.max() < 1e-2)
     True True
     """

@@ -69,11 +69,11 @@ def skin(
     The upper half of the unit sphere is shifted by its bone, the lower one stays:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
     >>> upper = (points[:, 2] > 0).astype(float)[:, None]
     >>> shift = np.column_stack([np.eye(3), [0, 0, 5]])
-    >>> moved = core.skin(points, upper, [shift])
+    >>> moved = mf.skin(points, upper, [shift])
     >>> print((moved - points)[[0, 799], 2])
     [5. 0.]
     """
@@ -110,9 +110,9 @@ class Skinner:
     The unit sphere, moved twice:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> skinner = core.Skinner(np.ones((len(points), 1)))
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> skinner = mf.Skinner(np.ones((len(points), 1)))
     >>> for shift in (1, 2):
     ...     moved = skinner.move(points, [np.column_stack([np.eye(3), [0, 0, shift]])])
     ...     print((moved - points)[0])

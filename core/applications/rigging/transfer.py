@@ -52,11 +52,11 @@ def transfer_values(
     The height over the unit sphere, of another sample of it:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> target, source = core.build_laplacian(points[:, [1, 2, 0]]), core.build_laplacian(points)
-    >>> match = core.match_surface(target, source)
-    >>> height = core.transfer_values(target, match, points[:, 2])
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> target, source = mf.build_laplacian(points[:, [1, 2, 0]]), mf.build_laplacian(points)
+    >>> match = mf.match_surface(target, source)
+    >>> height = mf.transfer_values(target, match, points[:, 2])
     >>> print(np.abs(height - target.points[:, 2]).max() < 0.01)
     True
     """
@@ -104,10 +104,10 @@ def transfer_labels(target: LaplaceBeltrami, match: SurfaceMatch, labels: ArrayL
     Which half of the unit sphere points are on, of another sample of it:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> target, source = core.build_laplacian(points[:, [1, 2, 0]]), core.build_laplacian(points)
-    >>> found = core.transfer_labels(target, core.match_surface(target, source), points[:, 2] > 0)
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> target, source = mf.build_laplacian(points[:, [1, 2, 0]]), mf.build_laplacian(points)
+    >>> found = mf.transfer_labels(target, mf.match_surface(target, source), points[:, 2] > 0)
     >>> print((found == (target.points[:, 2] > 0)).mean() > 0.95)
     True
     """

@@ -105,10 +105,10 @@ def heat_kernel_signature(
     All points of the unit sphere are alike, with ``sum_l (2 l + 1) exp(-l (l + 1)) / (4 pi) = 0.113`` at the time one:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> spectrum = core.build_laplacian(points).eigenpairs(16)
-    >>> heat = core.heat_kernel_signature(spectrum, [1.0])
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> spectrum = mf.build_laplacian(points).eigenpairs(16)
+    >>> heat = mf.heat_kernel_signature(spectrum, [1.0])
     >>> print(heat.shape, heat.min().round(3), heat.max().round(3))
     (800, 1) 0.113 0.113
     """
@@ -165,10 +165,10 @@ def wave_kernel_signature(spectrum: Spectrum, energies: ArrayLike | None = None,
     On the unit sphere the probability is the same everywhere at every energy, one over the area of 4 pi:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> spectrum = core.build_laplacian(points).eigenpairs(16)
-    >>> waves = core.wave_kernel_signature(spectrum, count=8)
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> spectrum = mf.build_laplacian(points).eigenpairs(16)
+    >>> waves = mf.wave_kernel_signature(spectrum, count=8)
     >>> print(waves.shape, waves.min().round(2), waves.max().round(2))
     (800, 8) 0.08 0.08
     """

@@ -93,12 +93,12 @@ def match_modes(
     Examples
     --------
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> laplacian = core.build_laplacian(points)
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> laplacian = mf.build_laplacian(points)
     >>> before = laplacian.eigenpairs(4)
-    >>> after = core.Spectrum(before.eigenvalues, -before.eigenvectors)  # as another run may give them
-    >>> matched = core.match_modes(after, laplacian.areas, points, before, points)
+    >>> after = mf.Spectrum(before.eigenvalues, -before.eigenvectors)  # as another run may give them
+    >>> matched = mf.match_modes(after, laplacian.areas, points, before, points)
     >>> np.allclose(matched.spectrum.eigenvectors, before.eigenvectors)
     True
     """

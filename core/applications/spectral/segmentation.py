@@ -76,13 +76,13 @@ def nodal_domains(
     On a sphere the height changes its sign at the equator, and x y has a domain in each quarter:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
     >>> z = points[:, 2]
-    >>> laplacian = core.build_laplacian(points)
-    >>> print(np.bincount(core.nodal_domains(z, laplacian)))
+    >>> laplacian = mf.build_laplacian(points)
+    >>> print(np.bincount(mf.nodal_domains(z, laplacian)))
     [400 400]
-    >>> print(core.nodal_domains(points[:, 0] * points[:, 1], laplacian).max() + 1)
+    >>> print(mf.nodal_domains(points[:, 0] * points[:, 1], laplacian).max() + 1)
     4
     """
     n = len(laplacian.points)
@@ -160,11 +160,11 @@ def segment(
     A dumbbell is divided at its waist, where z is zero:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
     >>> z = points[:, 2]
     >>> dumbbell = points * (0.4 + np.abs(z))[:, None]
-    >>> labels = core.segment(core.build_laplacian(dumbbell), 2)
+    >>> labels = mf.segment(mf.build_laplacian(dumbbell), 2)
     >>> print(labels.max() + 1, np.ptp(labels[z > 0.1]), np.ptp(labels[z < -0.1]))
     2 0 0
     """

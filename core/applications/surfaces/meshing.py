@@ -106,9 +106,9 @@ def mesh_surface(laplacian: LaplaceBeltrami, detail: float = 1.0, *, progress: P
     edges to itself:
 
     >>> import numpy as np
-    >>> import core
-    >>> points = core.example_sphere()
-    >>> mesh = core.mesh_surface(core.build_laplacian(points))
+    >>> import meshfree_laplacian as mf
+    >>> points = mf.example_sphere()
+    >>> mesh = mf.mesh_surface(mf.build_laplacian(points))
     >>> print(len(mesh.vertices) - len(mesh.faces))
     2
     >>> print(np.abs(np.linalg.norm(mesh.vertices, axis=1) - 1).max() < 1e-3)
