@@ -13,7 +13,9 @@ def join_notices(notices: Iterable[str]) -> list[str]:
 
     Examples
     --------
-    >>> join_notices(["a.las: is in feet.", "b.las: is in feet.", "b.las: left out 3 points.", "c.las: is in feet."])
+    >>> import meshfree_laplacian as mf
+    >>> notices = ["a.las: is in feet.", "b.las: is in feet.", "b.las: left out 3 points.", "c.las: is in feet."]
+    >>> mf.files.join_notices(notices)
     ['a.las and 2 other files: is in feet.', 'b.las: left out 3 points.']
     """
     files: dict[str, list[str]] = {}

@@ -49,6 +49,31 @@ def test_calls_that_users_start_from_have_examples():
     assert set(RUNNABLE) == set(SHOWN)
 
 
+OTHERS = {  # of the public packages that are not listed in core itself
+    test.name: test
+    for package in (core.files, core.paper, core.splats, core.tiles)
+    for name in dir(package)
+    if inspect.isfunction(getattr(package, name)) and not hasattr(core, name)
+    for test in doctest.DocTestFinder().find(getattr(package, name), f"{package.__name__}.{name}", globs={})
+    if test.examples
+}
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_example_of_a_package_gives_what_it_says(name):
+    printed = []
+    doctest.DocTestRunner().run(OTHERS[name], out=printed.append)
+    assert not printed, "".join(printed)
+
+
+def test_examples_call_core_by_the_name_that_it_has_in_the_wheel():
+    import_of_it = "import meshfree_laplacian as mf\n"
+    tests = OTHERS | {name: FOUND[name] for name in RUNNABLE}
+    assert len(OTHERS) >= 6
+    sources = {name: {example.source for example in test.examples} for name, test in tests.items()}
+    assert [name for name, source in sources.items() if import_of_it not in source or "import core\n" in source] == []
+
+
 def test_examples_begin_with_the_sphere_of_the_package():
     sphere = [example.source for example in doctest.DocTestParser().get_examples(core.__doc__)]
     begins = {name: [example.source for example in FOUND[name].examples[: len(sphere)]] for name in RUNNABLE}

@@ -51,6 +51,11 @@ def test_scipy_finds_the_modes_of_the_operator(tmp_path, monkeypatch):
     np.testing.assert_allclose(mass, np.eye(10), atol=1e-8)
 
 
+def test_pages_call_core_by_the_name_that_it_has_in_the_wheel():
+    named = r"^(from|import) core\b"
+    assert [one.id for one in typed() if re.search(named, one.text, re.MULTILINE)] == []
+
+
 def test_no_page_installs_a_name_that_is_not_published():
     """But from the address of a wheel."""
     told = [one.text for one in typed() if "pip" in one.text and re.search(r"meshfree[-_]laplacian", one.text)]
