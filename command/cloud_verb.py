@@ -1,6 +1,6 @@
 """Verbs for clouds of files: what is read, and the Laplacian of it."""
 
-from . import analysis, clouds
+from . import analysis, clouds, core
 from .inputs import add_choices, las_choices
 from .quantities import ORIENTATION
 from .settings import LAPLACIAN, add_setting, chosen, laplacian_options
@@ -12,6 +12,7 @@ class CloudVerb(Verb):
     """A verb for clouds, with options for how they are read; `work` of a subclass processes one."""
 
     settings = ()  # its own
+    bytes_a_point = 200  # of memory at the peak, but for operators, which are checked where they are built
 
     @property
     def inputs(self):
@@ -39,6 +40,7 @@ class CloudVerb(Verb):
 
     def run(self, path, arguments, output):
         given = self.read(path, arguments, arguments.columns)
+        core.memory.check_points(clouds.count(given), self.bytes_a_point)
         with ToldStages(self.name) as stages:
             figures, notices = self.work(path, given, arguments, output, stages)
         return {**figures, "seconds": stages.rounded, "notices": [*given.notices, *notices]}

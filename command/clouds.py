@@ -41,6 +41,11 @@ def read_file(path, columns="", las=None):
     return core.splats.read_file(path, lambda path: core.files.read_points(path, las=choices))
 
 
+def count(given) -> int:
+    """Return how many points or splats a file holds."""
+    return len(given) if isinstance(given, core.Splats) else len(given.points)
+
+
 class Cloud:
     """Points of a file, in double precision.
 

@@ -24,6 +24,7 @@ class Align(CloudVerb):
 
     name = "align"
     help = "move points onto the surface of those of another file, from nearby"
+    bytes_a_point = 500
     settings = tuple(alignment.ALIGN.values())
     reads = ("reference",)
     operator = "align_points"  # which writes the same result in Blender

@@ -215,6 +215,7 @@ class StrayPoints(CloudVerb):
 
     name = "stray-points"
     help = "find points off the surface, and those of small parts beside it; or delete them"
+    bytes_a_point = 3000
     settings = (
         Setting("action", "What happens to the stray points", "SHOW", choices=("SHOW", "DELETE")),
         *STRAYS.values(),

@@ -81,13 +81,32 @@ def check_memory(count: int, options: LaplacianOptions, modes: int = 0) -> None:
     NotEnoughMemoryError
         It does not fit; the text says how many points do.
     """
+    check_points(count, needed_memory(1, options, modes), "Use fewer points, a narrower kernel, or free memory.")
+
+
+def check_points(count: int, each: int, advice: str = "Use fewer points, or free memory.") -> None:
+    """Refuse work on points that does not fit the free memory.
+
+    Parameters
+    ----------
+    count : int
+        Points.
+    each : int
+        Bytes that a point takes at the peak.
+    advice : str
+        What to do.
+
+    Raises
+    ------
+    NotEnoughMemoryError
+        It does not fit; the text says how many points do.
+    """
     free = available_memory()
-    most = points_that_fit(options, modes)
+    most = None if free is None else int(_SHARE * free / each)
     if free is not None and most is not None and count > most:
         raise NotEnoughMemoryError(
-            f"{count:,} points would take about {needed_memory(count, options, modes) / 2**30:.1f} GB of memory, and"
-            f" {free / 2**30:.1f} GB are free: enough for {_rounded(most):,} points. Use fewer points,"
-            " a narrower kernel, or free memory.",
+            f"{count:,} points would take about {count * each / 2**30:.1f} GB of memory, and {free / 2**30:.1f} GB are"
+            f" free: enough for {_rounded(most):,} points. {advice}",
             fitting=most,
         )
 

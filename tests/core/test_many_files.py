@@ -285,6 +285,18 @@ def test_what_another_machine_may_do_has_an_exit_code_of_its_own(run, folder, mo
     assert run(*given)[0] == (code or 1)
 
 
+@pytest.mark.parametrize("verb", ["info", "convert", "thin-out", "stray-points"])
+def test_work_that_does_not_fit_the_memory_is_refused_before_the_start(run, folder, monkeypatch, verb):
+    """The system would end the program, and nobody would be told."""
+    given = verb, folder / "in" / "LHD_650_9.npy", *([] if verb == "info" else ["--out", folder / "out.ply"])
+    monkeypatch.setattr(core.memory, "available_memory", lambda: 40_000)
+    code, [line] = run(*given)
+    assert (code, (folder / "out.ply").exists()) == (3, False)
+    assert re.search(r"200 points would take about .* enough for \d+ points\. Use fewer points", line["error"])
+    monkeypatch.setattr(core.memory, "available_memory", lambda: 4_000_000)
+    assert run(*given)[0] == 0
+
+
 @pytest.mark.parametrize(("number", "code"), [(errno.ENOSPC, 3), (errno.EACCES, 1)])
 def test_a_report_that_cannot_be_written_is_told(run, folder, monkeypatch, number, code):
     def fail(*_):
