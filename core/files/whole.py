@@ -55,7 +55,7 @@ def replacing(path: FilePath) -> Iterator[Path]:
 
 
 @contextmanager
-def writing(path: Path) -> Iterator[None]:
+def writing(path: FilePath) -> Iterator[None]:
     """Convert errors while a file or folder is written into typed ones that name it.
 
     Raises
@@ -78,7 +78,7 @@ def _full() -> OSError:
 
 
 @contextmanager
-def holding(path: Path) -> Iterator[bool]:
+def holding(path: FilePath) -> Iterator[bool]:
     """Hold a file for this process, made if it is missing, and delete it at the end.
 
     Yields
@@ -87,6 +87,7 @@ def holding(path: Path) -> Iterator[bool]:
         False if another process holds it, which then goes on to. A process that is killed holds nothing any more. Where
         files cannot be locked, as in Windows and on some network drives, each process is told that it holds it.
     """
+    path = as_path(path)
     if fcntl is None:
         try:
             yield True

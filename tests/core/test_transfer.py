@@ -183,7 +183,7 @@ class TestTransfer:
         with pytest.raises(core.PointCloudError, match="match is of 1000 points"):
             core.transfer_values(ball, match, np.ones(1500))
         away = core.build_laplacian(anew.points + 9.0)
-        with pytest.raises(core.PointCloudError, match="Move the objects"):
+        with pytest.raises(core.PointCloudError, match="Move one onto the other"):
             core.transfer_labels(away, core.match_surface(away, ball), np.ones(1500))
 
 
