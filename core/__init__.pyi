@@ -124,6 +124,7 @@ from .geometry import check_points as check_points
 from .geometry import estimate_normals as estimate_normals
 from .geometry import orient_normals as orient_normals
 from .geometry import surface_discs as surface_discs
+from .memory import check_room as check_room
 from .memory import points_that_fit as points_that_fit
 from .operator import LaplaceBeltrami as LaplaceBeltrami
 from .operator import MeanCurvature as MeanCurvature

@@ -81,10 +81,10 @@ def check_memory(count: int, options: LaplacianOptions, modes: int = 0) -> None:
     NotEnoughMemoryError
         It does not fit; the text says how many points do.
     """
-    check_points(count, needed_memory(1, options, modes), "Use fewer points, a narrower kernel, or free memory.")
+    check_room(count, needed_memory(1, options, modes), "Use fewer points, a narrower kernel, or free memory.")
 
 
-def check_points(count: int, each: int, advice: str = "Use fewer points, or free memory.") -> None:
+def check_room(count: int, each: int, advice: str = "Use fewer points, or free memory.") -> None:
     """Refuse work on points that does not fit the free memory.
 
     Parameters
@@ -100,6 +100,15 @@ def check_points(count: int, each: int, advice: str = "Use fewer points, or free
     ------
     NotEnoughMemoryError
         It does not fit; the text says how many points do.
+
+    See Also
+    --------
+    points_that_fit : How many points an operator has room for.
+
+    Examples
+    --------
+    >>> import meshfree_laplacian as mf
+    >>> mf.check_room(1_000, each=200)
     """
     free = available_memory()
     most = None if free is None else int(_SHARE * free / each)

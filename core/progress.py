@@ -4,6 +4,7 @@ from collections.abc import Callable
 from functools import wraps
 from typing import Any, ParamSpec, TypeVar
 
+from .errors import Cancelled
 from .types import Progress
 
 _Given = ParamSpec("_Given")
@@ -14,11 +15,15 @@ class _Told:
     """A caller's progress, as plain floats, and its last stage; calls that it is passed on to do not end it."""
 
     def __init__(self, progress: Progress) -> None:
-        self._progress, self.stage = progress, "Done"
+        self._progress, self.stage, self.cancelled = progress, "Done", False
 
     def __call__(self, stage: str, fraction: float) -> None:
         self.stage = stage
-        self._progress(stage, float(fraction))
+        try:
+            self._progress(stage, float(fraction))
+        except Cancelled:
+            self.cancelled = True
+            raise
 
 
 def ends_at_one(call: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
@@ -31,7 +36,8 @@ def ends_at_one(call: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
             return call(*given, **named)
         named["progress"] = told = _Told(progress)
         result = call(*given, **named)
-        told(told.stage, 1.0)
+        if not told.cancelled:  # or the result is what was reached until then
+            told(told.stage, 1.0)
         return result
 
     return ended

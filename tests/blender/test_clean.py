@@ -1,5 +1,7 @@
 """Stray points in Blender: shown with their number, then selected, hidden, separated or deleted; points left out."""
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
@@ -131,7 +133,7 @@ def test_edit_mode_selects_them():
 
 def test_floaters_are_stray_splats():
     splats = bar_splats(core, degree=0)
-    splats.opacities[7] = 0.01
+    splats = replace(splats, opacities=np.where(np.arange(len(splats)) == 7, 0.01, splats.opacities))
     obj = add_splats(splats)
     bpy.ops.meshfree.stray_points()
     np.testing.assert_array_equal(np.flatnonzero(attribute(obj, "lb_stray")), [7])

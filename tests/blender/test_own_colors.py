@@ -1,5 +1,7 @@
 """Colors that points have of their own: shown at import, everywhere, and again after results; and the own material."""
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
@@ -305,8 +307,8 @@ class TestMesh:
 
     def test_of_splats(self, core, shown):
         splats = bar_splats(core, degree=0)
-        splats.colors[:] = (np.array(GREEN) - 0.5) * 2.0 * np.sqrt(np.pi)
-        add_splats(splats)
+        green = np.tile((np.array(GREEN) - 0.5) * 2.0 * np.sqrt(np.pi), (len(splats), 1))
+        add_splats(replace(splats, colors=green))
         made = self.run(bpy.context.object)
         assert shown(made) == "Color"
         assert [layer.name for layer in made.data.color_attributes] == ["Color"]
