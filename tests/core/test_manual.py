@@ -12,7 +12,7 @@ from core.files import read_points
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
-PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.rglob("*.md"))]
 LINK = re.compile(r"(?<!\\)\]\((?!https?://)([^)#\s]*)(?:#([^)\s]+))?\)")
 HOSTED = {"../../releases"}  # pages of the server that shows the README
 LARGEST = 300e3  # bytes of a picture
@@ -44,6 +44,12 @@ def test_links(path):
 def test_every_page_and_picture_is_linked():
     linked = {(path.parent / target).resolve() for path in PAGES for target, _ in LINK.findall(read(path))}
     assert {path for path in DOCS.rglob("*") if path.is_file()} <= linked
+
+
+@pytest.mark.parametrize("path", [*PAGES, ROOT / "CHANGELOG.md"], ids=lambda path: path.stem)
+def test_paragraphs_in_lists_are_indented_as_the_site_takes_them(path):
+    text = re.sub(r"^```.*?^```", "", read(path), flags=re.MULTILINE | re.DOTALL)
+    assert re.findall(r"\n\n {1,3}\S.*", text) == []
 
 
 def test_pictures_are_small():
