@@ -8,7 +8,7 @@ BOOT := $(shell for python in "$(PYTHON)" python3.11 python3.13 python3 python "
 	"$$python" -c "import sys; sys.exit(sys.version_info < (3, 8))" >/dev/null 2>&1 && echo "$$python" && break; done)
 run = $(if $(BOOT),"$(BOOT)",$(error No Python is found: install Python 3.11 or 3.13, or name it by PYTHON=...)) -B scripts/
 
-.PHONY: help demo test test-all test-gui build wheel validate audit lint benchmark index pictures release publish clean
+.PHONY: help demo test test-all test-gui build wheel validate audit lint docs benchmark index pictures release publish clean
 
 help: ## Show this list (default)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-12s%s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -41,6 +41,9 @@ lint: ## Check style, format and the types of core
 	@$(run)environments.py lint -m ruff check .
 	@$(run)environments.py lint -m ruff format --check .
 	@$(run)environments.py lint -m mypy
+
+docs: ## Build the site of the manual and the API into build/docs/; warnings, as of broken links, are errors
+	@$(run)environments.py docs -m mkdocs build --strict
 
 benchmark: ## Compute the tables and figures of the paper and the peers
 	@$(run)environments.py benchmark -m benchmarks.run $(ARGUMENTS)
