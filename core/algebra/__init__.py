@@ -15,8 +15,8 @@ from .davidson import coarse_to_fine
 from .dense import eliminate, inverses
 from .eigenvalue import largest_eigenvalue
 from .factors import dissect, sparsify
-from .hierarchy import Rows
 from .lanczos import lift_lowest
 from .rotations import TRACE, nearest_rotations, rotations_in_groups
+from .rows import Rows
 from .solvers import Iterate, bounded_quadratic, conjugate_gradients, solve_columns, solve_symmetric
 from .two_grid import TwoGrid

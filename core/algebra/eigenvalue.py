@@ -1,18 +1,13 @@
 """The largest eigenvalue of a symmetric matrix, by its products: bounded closely, or estimated."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
 from ..errors import SolverError
 from ..types import Floats
-
-if TYPE_CHECKING:
-    from .hierarchy import Rows
+from .rows import Rows
 
 _TOLERANCE, _ABOVE = 1e-2, 1.05  # of the Lanczos steps, and the factor that makes their result a bound
 

@@ -1,10 +1,7 @@
 """Coarse versions of a symmetric matrix, and the approximate inverses that they make together."""
 
-from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import Any, TypeVar
 
 import numpy as np
 from scipy import sparse
@@ -14,66 +11,13 @@ from scipy.sparse.linalg import LinearOperator
 from ..types import Array, Floats, Ints, Report
 from .dense import product
 from .eigenvalue import rough_largest_eigenvalue
+from .rows import Rows
 
 SMALL = 1000  # unknowns that are solved whole in a tenth of a second
-PART = 1 << 20  # entries of a matrix that are multiplied at once: some hundredths of a second
 STRONG = (3e-3, 1e-2, 3e-2, 0.1)  # share of the diagonal from which two unknowns may be one on the next level: of the
 # first about 20 become one, with the others fewer
 _ROUNDING = 1e-12  # share of the largest diagonal entry below which one is rounding
 _SMOOTHED = 0.3  # smoothing reduces the errors whose eigenvalues are at least this share of the largest
-
-Result = TypeVar("Result")
-
-
-class Rows:
-    """A sparse matrix whose products are taken by parts of its rows, on all cores.
-
-    Parameters
-    ----------
-    matrix : csr_array, (n, m)
-        Not copied.
-    pool : ThreadPoolExecutor
-    report : callable
-        Called without arguments after each part; may raise `Cancelled`.
-    """
-
-    def __init__(self, matrix: sparse.csr_array, pool: ThreadPoolExecutor, report: Report) -> None:
-        self._map, self._report, self._count, self._dtype = pool.map, report, matrix.shape[0], matrix.dtype
-        starts = np.append(np.arange(0, max(matrix.nnz, 1), PART), matrix.nnz)
-        cuts = np.unique(np.append(np.searchsorted(matrix.indptr[:-1], starts[:-1]), matrix.shape[0]))
-        self._slices = [slice(first, last) for first, last in pairwise(cuts)]
-        self._parts = []
-        for rows in self._slices:
-            pointers = matrix.indptr[rows.start : rows.stop + 1]
-            entries = slice(pointers[0], pointers[-1])
-            part = sparse.csr_array((len(pointers) - 1, matrix.shape[1]), dtype=matrix.dtype)
-            # Set afterwards, for the constructor would copy a small slice of an array.
-            part.data, part.indices, part.indptr = matrix.data[entries], matrix.indices[entries], pointers - pointers[0]
-            self._parts.append(part)
-
-    def __matmul__(self, other: Any) -> Any:
-        """Multiply with an array, (m, k), or a sparse one."""
-        if sparse.issparse(other):
-            return sparse.vstack(list(self.each(lambda rows, part: part @ other)), format="csr")
-        return self.product(other, lambda rows, values: None)
-
-    def product(self, other: Array, change: Callable[[slice, Array], None]) -> Array:
-        """Multiply with an array, (m, k), and change each part of the product, in place, while it is in the cache."""
-        result = np.empty((self._count, other.shape[1]), dtype=np.result_type(self._dtype, other.dtype))
-
-        def fill(rows: slice, part: sparse.csr_array) -> None:
-            values = part @ other
-            change(rows, values)
-            result[rows] = values
-
-        list(self.each(fill))
-        return result
-
-    def each(self, function: Callable[[slice, sparse.csr_array], Result]) -> Iterator[Result]:
-        """Yield the results of a function of each slice of the rows and the part of the matrix there."""
-        for result in self._map(function, self._slices, self._parts):
-            self._report()
-            yield result
 
 
 @dataclass

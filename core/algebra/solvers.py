@@ -11,7 +11,8 @@ from scipy import sparse
 from ..cores import cores
 from ..errors import SolverError
 from ..types import Array, Floats, Progress
-from .hierarchy import PART, Rows, approximate_inverse
+from .hierarchy import approximate_inverse
+from .rows import PART, Rows
 
 _STEPS = 20_000  # of `solve_symmetric`, at most
 _FEW = 20_000  # unknowns up to which coarse versions, which cost as much as 120 to 150 steps, do not pay

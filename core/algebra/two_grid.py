@@ -12,7 +12,8 @@ from ..types import Array, Bools, Floats, Progress
 from .cholesky import factorize
 from .eigenvalue import rough_largest_eigenvalue
 from .factors import dissect
-from .hierarchy import STRONG, Rows, aggregates, smoothing_steps
+from .hierarchy import STRONG, aggregates, smoothing_steps
+from .rows import Rows
 
 _FAINT = 1e-200  # of the largest value: less is not compared
 _ACCURACY = 1e-3  # largest change in the last step, relative to the value of each point

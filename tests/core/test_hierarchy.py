@@ -11,7 +11,8 @@ from scipy.spatial import cKDTree
 import core
 from benchmarks.samplings import random_sphere
 from core.algebra import coarse_to_fine, solvers
-from core.algebra.hierarchy import Rows, approximate_inverse
+from core.algebra.hierarchy import approximate_inverse
+from core.algebra.rows import Rows
 from core.algebra.solvers import conjugate_gradients, solve_symmetric
 
 CLOUDS = ["another random sphere", "coarse torus", "random square", "density jump"]
@@ -188,7 +189,7 @@ def test_it_can_be_stopped_at_any_time(operators, coarse):
 
 
 def test_a_product_is_changed_part_by_part(monkeypatch):
-    monkeypatch.setattr("core.algebra.hierarchy.PART", 50)
+    monkeypatch.setattr("core.algebra.rows.PART", 50)
     rng = np.random.default_rng(0)
     matrix, other, load = (
         sparse.random_array((60, 40), density=0.2, rng=rng).tocsr(),
