@@ -1,12 +1,12 @@
 """Measurements on the points: neighbourhoods, components, normals, boundary, pairs; `cloud` runs the stages."""
 
 from .agreed import Agreed, Decisions
+from .arcs import arc_length
 from .bandwidth import neighbor_distance
 from .boundary import Boundary
 from .cloud import (
     Cloud,
     Discs,
-    Sample,
     Surface,
     divide_components,
     divide_sheets,
@@ -23,7 +23,7 @@ from .cloud import (
     with_scatter,
 )
 from .components import find_gaps, gap_reach, label_connected, move_apart, number_sizes
-from .distances import arc_ahead, arc_length, arc_squared, circle_arc, dots, pair_heights
+from .distances import arc_ahead, arc_squared, circle_arc, dots, pair_heights
 from .doubt import Doubt
 from .moments import LARGEST, MET, TERMS, EdgeTerms, put_terms
 from .nearest import (
@@ -44,11 +44,13 @@ from .normals import near_edges, side_sums, sides_by_sums, signs_by_sums, unit_n
 from .orientation import orient_normals, toward
 from .pairs import Pairs
 from .patches import Patch
-from .points import FEWEST, ScaledPoints, as_indices, as_mask, check_points, check_values, scale_points
+from .points import FEWEST, as_indices, as_mask, check_points, check_values, scale_points
 from .prolongation import Prolongation, balanced_weights
 from .quadrics import CURVED, MANY, check_surface, count_curves, frames, roundness
 from .rounding import find_rounding, smooth_rounded
 from .rows import look_across_rows
+from .sample import Sample
+from .scaled import ScaledPoints
 from .sheets import choose_bridges, join_touching, sheet_neighbors
 from .strays import PARTS, label_parts, stray_scores, without
 from .subset import FINEST, blue_noise_subset, independent, mix_bits

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any, Self, TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
 from ..frozen import Frozen
 from ..types import Floats, Ints
-
-if TYPE_CHECKING:
-    from .points import ScaledPoints
+from .scaled import ScaledPoints
 
 _Value = TypeVar("_Value")
 _OF_POINTS = ("component", "sheet", "side")

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..algebra import blocks, on_all_cores
 from ..cores import cores
 from ..types import Bools, Floats, Ints, Report
+from .boundary import Boundary
 from .distances import arc_ahead, arc_squared, bent_ways, heights_of_ends
+from .edges import Sides
 from .nearest import COUNT, Nearest
 from .quadrics import CURVED, along, chords, frames, gathered
 from .sheets import on_sheet
-
-if TYPE_CHECKING:
-    from .boundary import Boundary
-    from .edges import Sides
 
 _BLOCK = 1 << 12
 _SAME = 1e-9  # share of the longest cut, or of their product, by which two that differ are one

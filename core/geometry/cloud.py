@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,14 +21,13 @@ from .components import gap_reach, label_components, move_apart
 from .distances import measure_squared_slope
 from .doubt import likely_causes
 from .edges import Sides, find_sides, one_side
-from .nearest import Nearest, find_nearest
+from .nearest import find_nearest
 from .noise import FALLING, FILLING, LEFT, mean_misfits, near_misfit, noise_level, project_points
 from .normals import unit_normals
 from .outliers import find_outliers
 from .pairs import Pairs, find_pairs
 from .points import (
     FEWEST_OF_SURFACE,
-    ScaledPoints,
     as_mask,
     check_boundary,
     check_distances,
@@ -38,54 +37,14 @@ from .points import (
 from .quadrics import MANY, Quadrics, check_surface, count_curves, frames
 from .rounding import smooth_rounded
 from .rows import look_across_rows
+from .sample import Sample
+from .scaled import ScaledPoints
 from .sheets import Sheets, fit_sheets, label_sheets, separate_sheets
 from .voids import find_voids, no_voids
 from .winding import orient_by_winding
 
 _DRAWN = 20  # points that a surface needs at least, to be drawn
 _NARROW = 0.6  # h over the depth of the surface that is too wide
-
-
-@dataclass(frozen=True)
-class Sample:
-    """The points that take part, by component, in scaled coordinates.
-
-    Attributes
-    ----------
-    scaled : ScaledPoints
-        The m distinct points, and how they map to the caller's.
-    component : ndarray, (m,) int
-        Of each point, the largest 0.
-    nearest : Nearest
-        Neighbours of each point; components stand far apart there, and noisy points are where they were moved to.
-    noise : ndarray, (m,)
-        Noise that was smoothed at each point, as a share of the spacing; zero where none was.
-    scatter : ndarray, (2, m)
-        What quadrics missed the neighbours of each point by before that, see `likely_causes`; zero until it is known.
-    step : float
-        Distance from level to level where depth is rounded so coarsely that this was smoothed, as a share of the
-        spacing; zero elsewhere.
-    decisions : Decisions
-        What is decided for the points as a whole.
-    """
-
-    scaled: ScaledPoints
-    component: Ints
-    nearest: Nearest
-    noise: Floats
-    scatter: Floats
-    step: float = 0.0
-    decisions: Decisions = field(default_factory=Decisions)
-
-    @property
-    def moved(self) -> Floats:
-        """Offsets by which the points were moved to smooth noise, (m, 3)."""
-        return self.nearest.points - move_apart(self.scaled.points, self.component)
-
-    @property
-    def places(self) -> Floats:
-        """Where the points are, noisy ones where they were moved to, components where they stand, (m, 3)."""
-        return self.scaled.points + self.moved
 
 
 @dataclass(frozen=True)

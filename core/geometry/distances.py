@@ -1,20 +1,12 @@
 """Distances between neighbours along the surface, from their normals."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..algebra import on_all_cores
 from ..types import Floats, Ints
 from .nearest import AGREEING, NEXT, SMOOTH, Nearest
-from .patches import Patch
 from .quadrics import chords, gathered
-
-if TYPE_CHECKING:
-    from .cloud import Cloud
 
 
 def arc_squared(squared: Floats, left: Floats, right: Floats, cosine: Floats | float = 1.0) -> Floats:
@@ -81,48 +73,6 @@ def bent_ways(
 def circle_arc(chord: Floats, sine: Floats) -> Floats:
     """Return the length of circular arcs over chords, to all orders, by the sine of half their angle, |t| / (2 r)."""
     return chord * np.where(sine > 1e-4, np.arcsin(sine) / np.maximum(sine, 1e-4), 1.0)
-
-
-def arc_length(cloud: Cloud) -> Floats:
-    """Return the length of the arc that joins each pair within the surface.
-
-    That of `arc_squared`, or of `bent_ways` where an edge is near, and ``g max(r^2 - a^2, 0)`` more: the path up and
-    down over a roughness finer than the normals resolve, of mean squared slope g, the mean of both ends. Between points
-    one spacing a apart the chord is that path.
-
-    Parameters
-    ----------
-    cloud : Cloud
-        Of m points, with p pairs. The second normal is flipped to the first one's side, pair by pair, by the normals of
-        all neighbours: signs do not matter.
-
-    Returns
-    -------
-    ndarray, (p,)
-    """
-    pairs, steep = cloud.pairs, cloud.squared_slope.any()
-    result = np.empty(len(pairs.first))
-    points, normals = pairs.points.T.copy(), cloud.sides.normals.T.copy()
-    around, sharp = cloud.sides.around.T.copy(), cloud.sides.sharp
-
-    def measure(patch: Patch) -> None:
-        chord, left, right, cosine = pair_heights(patch.first, patch.second, points, normals)
-        side = np.where(dots(patch.first(around), patch.second(around)) < 0.0, -1.0, 1.0)
-        right, cosine = side * right, side * cosine
-        squared = pairs.distance[patch.pairs] ** 2
-        arc = arc_squared(squared, left, right, cosine)
-        sure = np.maximum(patch.first(sharp), patch.second(sharp))
-        edged = np.flatnonzero(sure)
-        if len(edged):
-            first, second = (ends[patch.pairs][edged] for ends in (pairs.first, pairs.second))
-            turn = cloud.sides.turn(first, second, chord[:, edged].T, side[edged])
-            arc[edged] = bent_ways(squared[edged], left[edged], right[edged], cosine[edged], turn, sure[edged])[0]
-        if steep:
-            arc += patch.mean(cloud.squared_slope) * np.maximum(squared - patch.mean(cloud.spacing) ** 2, 0.0)
-        result[patch.pairs] = np.sqrt(arc)
-
-    on_all_cores(measure, pairs.patches)
-    return result
 
 
 def measure_squared_slope(nearest: Nearest, normals: Floats) -> Floats:

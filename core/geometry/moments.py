@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ..algebra import blocks, eliminate, on_all_cores
 from ..kernel import SUPPORT, pair_kernel
 from ..types import Floats, Ints
+from .boundary import Boundary
 from .nearest import COUNT, Nearest
 from .quadrics import along, chords, frames, gathered
 from .sheets import on_sheet
-
-if TYPE_CHECKING:
-    from .boundary import Boundary
 
 TERMS = 5  # of a point: trace of the second moment, first moment (2), the rest of the second (2)
 _MORE = 64, 160  # neighbours looked at where the kernel holds more than 40; beyond, any sampling is dense enough

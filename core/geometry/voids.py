@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -11,13 +10,11 @@ from scipy.spatial import cKDTree
 from ..cores import cores
 from ..types import Bools, Floats, Ints
 from .boundary import HOLE, PROBE, SURE, VOID
+from .cells import Cells
 from .components import label_connected
 from .nearest import ENOUGH, NEXT, ON, ROW, Nearest
 from .quadrics import fit_quadrics
-
-if TYPE_CHECKING:
-    from .cells import Cells
-    from .cloud import Sample
+from .sample import Sample
 
 _TOLD = 30.0  # that of a void that is told though it is no slit; of 300,000 random points none had above 16
 _LONG = 5.0  # twice the standard deviation of a slit along its length, over its radius: 1.4 of the rim of a disc

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -11,15 +10,12 @@ from numpy.typing import ArrayLike
 from scipy.special import expit
 
 from ..algebra import chebyshev_sum, on_all_cores
-from ..geometry import ROUNDS, arc_length, read_cloud
+from ..geometry import ROUNDS, Boundary, Cloud, Pairs, Patch, arc_length, read_cloud
 from ..kernel import kernel
 from ..options import LaplacianOptions
 from ..types import Bools, Floats, Report
 from .curvature import kernel_integral, uneven
 from .images import mirror, own_images
-
-if TYPE_CHECKING:
-    from ..geometry import Boundary, Cloud, Pairs, Patch
 
 _FLOOR = 0.5  # least area in units of that of the Voronoi cell: all stay positive
 _DEGREE = 8  # of the polynomial of the first round; half of it of the second, for what the floor changed in the first

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
 
 from ..geometry import repeated
 from ..types import Array, Floats
-
-if TYPE_CHECKING:
-    from .laplacian import LaplaceBeltrami
+from .laplacian import LaplaceBeltrami
 
 ROUNDS = (0, 1, 2, 4, 8)  # of averaging that are compared; the last reaches as far as halos of tiles allow
 _WINDOWS = 3, 3, 5, 8  # rounds over which a change by averaging is measured: those around say the same, but not chance

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scipy import sparse
 
 from ..geometry import frames
-
-if TYPE_CHECKING:
-    from .laplacian import LaplaceBeltrami
+from .laplacian import LaplaceBeltrami
 
 _ROUNDING = 1e-9  # smaller over larger extent of the neighbours, squared, below which they lie on a line
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,9 +10,7 @@ from ..algebra import blocks, on_all_cores
 from ..cores import cores
 from ..geometry import SMOOTH, find_nearest
 from ..types import Array, Bools, Floats, Ints, Report
-
-if TYPE_CHECKING:
-    from .laplacian import LaplaceBeltrami
+from .laplacian import LaplaceBeltrami
 
 _NEIGHBORS = 12  # of a place, whose quadrics are averaged
 _BLOCK = 1 << 13  # places looked at at one time

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +11,7 @@ from scipy import sparse
 from ..arguments import check_switches
 from ..errors import InvalidPointsError
 from ..frozen import Frozen
-from ..geometry import Agreed, Doubt, arc_length, check_points, check_values, move_apart, read_cloud, toward
+from ..geometry import Agreed, Cloud, Doubt, arc_length, check_points, check_values, move_apart, read_cloud, toward
 from ..kernel import SECOND_MOMENT
 from ..memory import check_memory
 from ..options import LaplacianOptions, check_options
@@ -22,9 +21,6 @@ from .areas import NO_AREA, solve_areas
 from .spectrum import TOLERANCE, Spectrum, correct_eigenvalues, solve_spectrum
 from .stiffness import Stiffness, assemble_stiffness
 from .trust import doubt_notices, measure_trust
-
-if TYPE_CHECKING:
-    from ..geometry import Cloud
 
 NARROW = 45  # neighbours inside the support of a narrow operator: the fewest that suffice for random points
 
@@ -302,7 +298,8 @@ class LaplaceBeltrami(Frozen):
         """
         check_switches(raw=raw, dirichlet=dirichlet)
         stiffness = self.dirichlet[0] if dirichlet else self.stiffness
-        spectrum = solve_spectrum(self, stiffness, count, tolerance, progress)
+        places = self.points, self.areas, self.component, self.smoothing_lengths
+        spectrum = solve_spectrum(stiffness, *places, count, tolerance, progress)
         return spectrum if raw else self.corrected(spectrum)
 
     def corrected(self, spectrum: Spectrum) -> Spectrum:
@@ -324,7 +321,8 @@ class LaplaceBeltrami(Frozen):
             Modes that vary faster than the smoothing length resolves.
         """
         values, vectors = spectrum.eigenvalues, spectrum.eigenvectors
-        return Spectrum(correct_eigenvalues(self, values, vectors), vectors, spectrum.residuals)
+        values = correct_eigenvalues(self.areas, self.kernel_widths, values, vectors)
+        return Spectrum(values, vectors, spectrum.residuals)
 
 
 @ends_at_one

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,9 +10,7 @@ from ..frozen import Frozen
 from ..geometry import frames
 from ..types import Floats
 from .averaging import Averages, Settled, off_neighbors
-
-if TYPE_CHECKING:
-    from .laplacian import LaplaceBeltrami
+from .laplacian import LaplaceBeltrami
 
 _OPERATOR = 0.35  # of what changes from point to point in the operator's curvature, at least as much noise is left
 _AROUND = 2  # rounds of averaging over which it is compared with that of quadrics

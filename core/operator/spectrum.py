@@ -1,10 +1,7 @@
 """Eigenpairs of the operator, eq. (12) of the paper."""
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
@@ -19,9 +16,6 @@ from ..frozen import Frozen
 from ..kernel import inverse_ratio, symbol
 from ..memory import check_mode_memory
 from ..types import Floats, Ints, Progress, Report
-
-if TYPE_CHECKING:
-    from .laplacian import LaplaceBeltrami
 
 TOLERANCE = 2e-7  # leaves eigenvalues right to ten digits and more, for their errors go by its square
 
@@ -52,14 +46,16 @@ class Spectrum(Frozen):
 
 
 def solve_spectrum(
-    laplacian: LaplaceBeltrami,
     stiffness: sparse.csr_array,
+    points: Floats,
+    areas: Floats,
+    component: Ints,
+    lengths: Floats,
     count: int,
     tolerance: float = TOLERANCE,
     progress: Progress | None = None,
 ) -> Spectrum:
     """Compute raw eigenpairs; see `LaplaceBeltrami.eigenpairs`."""
-    areas = laplacian.areas
     n = len(areas)
     if not whole(count) >= 1:
         raise TooFewPointsError(f"{count!r} modes were asked for. Ask for a whole number of at least 1.")
@@ -76,15 +72,15 @@ def solve_spectrum(
             progress("Spectrum", done)
 
     report()
-    order, root, matrix = symmetric_form(laplacian, stiffness, report)
+    order, root, matrix = symmetric_form(stiffness, points, areas, component, report)
     # In eigenvalues near one, by a power of two: solvers take those below some number for zero, in any unit.
     unit = np.ldexp(1.0, np.frexp(matrix.diagonal().max())[1])
     matrix.data /= unit
-    weyl = 4.0 * np.pi * count / laplacian.areas.sum() / unit
+    weyl = 4.0 * np.pi * count / areas.sum() / unit
     few = count <= _FEW * len(order)
     pairs = coarse_to_fine(matrix, 1.0 / root, count, tolerance, weyl, report) if few else None
     try:
-        values, vectors = pairs or lift_lowest(matrix, count, _cut(laplacian, count) / unit, report)
+        values, vectors = pairs or lift_lowest(matrix, count, _cut(areas, lengths, count) / unit, report)
     except ArpackNoConvergence as error:
         raise SolverError(
             f"The eigenvalue solver found {len(error.eigenvalues)} of {count} modes on {n} points. Ask for fewer modes."
@@ -116,23 +112,24 @@ def _missed(matrix: sparse.csr_array, values: Floats, vectors: Floats) -> Floats
     return np.sqrt(np.einsum("ij,ij->j", missed, missed))
 
 
-def _cut(laplacian: LaplaceBeltrami, count: int) -> float:
+def _cut(areas: Floats, lengths: Floats, count: int) -> float:
     """Return the raw eigenvalue for twice Weyl's estimate 4 pi count / area of the highest one wanted."""
-    squared = np.mean(laplacian.smoothing_lengths**2)
-    frequency = 8.0 * np.pi * count / laplacian.areas.sum() * squared
+    squared = np.mean(lengths**2)
+    frequency = 8.0 * np.pi * count / areas.sum() * squared
     return float(symbol(np.sqrt(min(frequency, _FLAT**2))) / squared)
 
 
 def symmetric_form(
-    laplacian: LaplaceBeltrami, stiffness: sparse.csr_array, report: Report = lambda: None
+    stiffness: sparse.csr_array, points: Floats, areas: Floats, component: Ints, report: Report = lambda: None
 ) -> tuple[Ints, Floats, sparse.csr_array]:
     """Return a matrix with the eigenvalues of the negated operator whose eigenvectors are orthonormal.
 
     Parameters
     ----------
-    laplacian : LaplaceBeltrami
     stiffness : csr_array, (n, n)
-        Its own, or that of Dirichlet's problem.
+        That of the operator, or of Dirichlet's problem.
+    points, areas, component : ndarray
+        Of the operator.
     report : callable
         Called without arguments between the steps; may raise `Cancelled`.
 
@@ -146,10 +143,10 @@ def symmetric_form(
     matrix : csr_array, (m, m)
         Symmetric positive semi-definite [1 / L^2].
     """
-    known = np.flatnonzero(laplacian.component >= 0)
-    known = known[np.lexsort(laplacian.points[known].T)]
-    order = known[cKDTree(laplacian.points[known]).indices]
-    root = 1.0 / np.sqrt(laplacian.areas[order])
+    known = np.flatnonzero(component >= 0)
+    known = known[np.lexsort(points[known].T)]
+    order = known[cKDTree(points[known]).indices]
+    root = 1.0 / np.sqrt(areas[order])
     report()
     place = np.zeros(stiffness.shape[0], dtype=stiffness.indices.dtype)
     place[order] = np.arange(len(order))
@@ -162,7 +159,7 @@ def symmetric_form(
     return order, root, matrix
 
 
-def correct_eigenvalues(laplacian: LaplaceBeltrami, values: Floats, vectors: Floats) -> Floats:
+def correct_eigenvalues(areas: Floats, widths: Floats, values: Floats, vectors: Floats) -> Floats:
     """Recover k^2 from ``lambda = s(k h) / h^2`` mode by mode, with the h^2 that the mode sees on average.
 
     A mode's own mean, ``sum areas h^2 phi^2``, is the one by which a slowly varying h enters the eigenvalue to first
@@ -173,13 +170,13 @@ def correct_eigenvalues(laplacian: LaplaceBeltrami, values: Floats, vectors: Flo
     UnresolvedModesError
         Some modes lie beyond the resolved range.
     """
-    squared = (laplacian.areas * laplacian.kernel_widths**2) @ vectors**2
+    squared = (areas * widths**2) @ vectors**2
     corrected = values * inverse_ratio(values * squared)
     if not np.isfinite(corrected).all():
         resolved = int(np.argmin(np.isfinite(corrected)))
         raise UnresolvedModesError(
             f"The {len(values)} modes asked for vary faster than the smoothing length resolves: {resolved} are"
-            f" resolved on {len(laplacian.areas)} points. Ask for at most {resolved}, or make the"
+            f" resolved on {len(areas)} points. Ask for at most {resolved}, or make the"
             " kernel narrower.",
             resolved=resolved,
         )

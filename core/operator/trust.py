@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from ..geometry import Doubt
+from ..geometry import Cloud, Doubt
 from ..types import Floats, Ints
-
-if TYPE_CHECKING:
-    from ..geometry import Cloud
 
 _FAR, _MISSED = 0.1, 1.0  # residual of the moments, and misfit of quadrics in spacings, at which trust is a half
 _DOUBTFUL = 0.02  # share of the area in doubt from which there is a notice

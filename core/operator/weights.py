@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..algebra import chebyshev_steps, inverses, on_all_cores
-from ..geometry import LARGEST, MET, TERMS, EdgeTerms, arc_ahead, dots, frames, put_terms
+from ..geometry import LARGEST, MET, TERMS, Cloud, EdgeTerms, Patch, arc_ahead, dots, frames, put_terms
 from ..kernel import SECOND_MOMENT
 from ..types import Floats, Ints, Report
 from .curvature import second_moment, uneven
-
-if TYPE_CHECKING:
-    from ..geometry import Cloud, Patch
 
 _ROUNDS = 16  # of the solver, at most
 _SMALLEST = 1e-6  # error of the moments that is none: with a larger one results would depend on where a cloud lies

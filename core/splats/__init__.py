@@ -2,7 +2,7 @@
 
 from .columns import LENGTHS as LENGTHS
 from .columns import NEEDED as NEEDED
-from .file import SplatFile as SplatFile
+from .columns import SplatFile as SplatFile
 from .file import encoded as encoded
 from .file import holds_splats as holds_splats
 from .file import read_file as read_file

@@ -1,6 +1,7 @@
 """The columns of files of Gaussian splats by trainers: their names, and encodings of numbers."""
 
 from collections.abc import Sequence
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
@@ -18,6 +19,30 @@ LENGTHS = ("filter_3D",)  # further columns that are lengths: the filter of Mip-
 _SMALLEST = float(np.finfo(np.float32).tiny)
 _LARGEST = float(np.finfo(np.float32).max)
 _NEAR = 2.0**-25  # half a step of single precision below one
+
+
+class SplatFile(NamedTuple):
+    """The contents of a file of splats, from which unchanged data are written again.
+
+    Attributes
+    ----------
+    columns : dict of str to ndarray, (n,)
+        By the names of the properties, in their order and types: scales as logarithms, opacities as logits.
+    order : str
+        Of the bytes, "<" or ">".
+    comments : list of str
+        Lines of the header.
+    """
+
+    columns: dict[str, Array]
+    order: str = "<"
+    comments: Sequence[str] = ()
+
+    def scaled(self, factors: Floats) -> Self:
+        """Return this with those columns that are lengths multiplied by a factor for each splat, (n,)."""
+        lengths = {name: self.columns[name] for name in LENGTHS if name in self.columns}
+        scaled = {name: (values * factors).astype(values.dtype) for name, values in lengths.items()}
+        return self._replace(columns={**self.columns, **scaled})
 
 
 def stack(columns: dict[str, Array], names: Sequence[str], dtype: DTypeLike = np.float64) -> Array:

@@ -1,8 +1,8 @@
 """Files of Gaussian splats: PLY by trainers, and other layouts."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple, NoReturn, Self
+from typing import NoReturn
 
 import numpy as np
 
@@ -28,13 +28,13 @@ from . import packed
 from .antimatter import read_antimatter
 from .columns import (
     COLORS,
-    LENGTHS,
     NEEDED,
     OPACITY,
     PLACES,
     REST,
     ROTATIONS,
     SCALES,
+    SplatFile,
     decode_opacities,
     decode_rotations,
     decode_scales,
@@ -50,30 +50,6 @@ from .splats import Splats
 from .spz import is_spz, read_spz
 
 _LOST = 1e-6  # of the extent: rounding of positions that matters
-
-
-class SplatFile(NamedTuple):
-    """The contents of a file of splats, from which unchanged data are written again.
-
-    Attributes
-    ----------
-    columns : dict of str to ndarray, (n,)
-        By the names of the properties, in their order and types: scales as logarithms, opacities as logits.
-    order : str
-        Of the bytes, "<" or ">".
-    comments : list of str
-        Lines of the header.
-    """
-
-    columns: dict[str, Array]
-    order: str = "<"
-    comments: Sequence[str] = ()
-
-    def scaled(self, factors: Floats) -> Self:
-        """Return this with those columns that are lengths multiplied by a factor for each splat, (n,)."""
-        lengths = {name: self.columns[name] for name in LENGTHS if name in self.columns}
-        scaled = {name: (values * factors).astype(values.dtype) for name, values in lengths.items()}
-        return self._replace(columns={**self.columns, **scaled})
 
 
 def holds_splats(path: FilePath) -> bool:

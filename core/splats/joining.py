@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..types import Floats
-from .columns import REST
-from .file import SplatFile, encoded
+from .columns import REST, SplatFile
+from .file import encoded
 from .splats import Splats
 
 _ARRAYS = ("positions", "scales", "rotations", "opacities", "colors")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,11 +12,9 @@ from ..algebra import nearest_rotations
 from ..arguments import as_array, check_array, check_finite
 from ..frozen import Frozen
 from ..types import Array, Floats
+from .columns import SplatFile
 from .ellipsoids import mapped, matrices_of
 from .harmonics import COUNTS, rotated
-
-if TYPE_CHECKING:
-    from .file import SplatFile
 
 
 @dataclass(frozen=True)

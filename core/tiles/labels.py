@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -11,11 +11,8 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components, mini
 
 from ..geometry import ScaledPoints, label_connected
 from ..types import Array, Bools, Floats, Ints
-from .shelf import visited
-
-if TYPE_CHECKING:
-    from .shelf import Record, Shelf, Told
-    from .site import Site
+from .shelf import Record, Shelf, Told, visited
+from .site import Site
 
 
 def label_links(site: Site, scaled: ScaledPoints, index: Ints, joined: Bools) -> Told:
@@ -112,25 +109,6 @@ def starts(shelf: Shelf, step: str, counts: Iterable[int]) -> Ints:
 def names_of(step: str, name: str, start: Ints, values: Array) -> Record:
     """Return the record of what is agreed on, under a name, for the labels that a step has given in each tile."""
     return {name: values, f"{step} start": start}
-
-
-def named(record: Record, step: str, name: str, owner: Ints, label: Ints, neutral: Any) -> Array:
-    """Return what is agreed on, under a name, for labels that a step has given in some tiles; those below 0 have none.
-
-    Parameters
-    ----------
-    record : dict
-        With `names_of` that step.
-    step, name : str
-    owner, label : ndarray, (k,) int
-    neutral
-        For those without a label.
-    """
-    values, start = record[name], record[f"{step} start"]
-    result = np.full(len(label), neutral, values.dtype)
-    rows = np.flatnonzero(label >= 0)
-    result[rows] = values[start[owner[rows]] + label[rows]]
-    return result
 
 
 def agree_on_signs(first: Ints, second: Ints, votes: Floats, count: int) -> Floats:

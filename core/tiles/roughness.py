@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ..applications import DETAIL, roughness
@@ -13,9 +11,7 @@ from ..operator import LaplaceBeltrami
 from ..types import Floats
 from .medians import median
 from .shelf import Record, Shelf, Told
-
-if TYPE_CHECKING:
-    from .site import Site
+from .site import Site
 
 ROUGHNESS = "roughness"  # the name of this result, which a store has if it was asked for
 _WAVELENGTH = "wavelength"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,9 +13,7 @@ from ..files import SCANNER
 from ..geometry import Sample
 from ..types import Array, Floats, Ints
 from .shelf import Record, Shelf, Told
-
-if TYPE_CHECKING:
-    from .site import Site
+from .site import Site
 
 ORIENTS = ("outside", "up", "viewpoint")
 _CELL = 8.0  # spacings: a surface seen from the front has some 64 points in a cell, of which the nearest counts

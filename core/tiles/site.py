@@ -10,7 +10,6 @@ import numpy as np
 from ..geometry import Agreed, Decisions, ScaledPoints
 from ..options import LaplacianOptions
 from ..types import Array, Bools, Floats, Ints
-from .labels import named
 from .shelf import Part, Record, Shelf
 
 _SCALARS = ("scale", "spacing", "reach", "length")
@@ -72,8 +71,16 @@ class Site:
         return result
 
     def named(self, step: str, name: str, neutral: Any = -1) -> Array:
-        """Return what is agreed on, under a name, for the labels that a step has given to the points here, (k,)."""
-        return named(self.record, step, name, self.part.owner, self.around(step, "label", -1), neutral)
+        """Return what is agreed on, under a name, for the labels that a step has given to the points here, (k,).
+
+        The record is that of `names_of`; points without a label have a neutral value.
+        """
+        owner, label = self.part.owner, self.around(step, "label", -1)
+        values, start = self.record[name], self.record[f"{step} start"]
+        result = np.full(len(label), neutral, values.dtype)
+        rows = np.flatnonzero(label >= 0)
+        result[rows] = values[start[owner[rows]] + label[rows]]
+        return result
 
     def agreed(self) -> Agreed:
         """Return what is agreed on for the points here."""

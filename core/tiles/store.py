@@ -21,7 +21,7 @@ from ..options import LaplacianOptions
 from ..types import Array, FilePath, Floats
 from .shelf import Part, Record, Told, visited
 
-VERSION = 3
+VERSION = 4
 POINTS, COLUMNS = "points.npy", "columns.npy"
 _MANIFEST, _ERROR = "manifest.json", "error.json"
 _TRUSTED = ("numpy", "scipy", "builtins", "copyreg", __package__.rpartition(".")[0])  # packages of what states hold

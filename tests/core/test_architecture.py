@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -59,6 +60,25 @@ def test_imports_point_one_way(package, forbidden):
     assert files
     found = {(file.name, name) for file in files for name in imported(file)}
     assert {(file, name) for file, name in found if name.lstrip(".").split(".")[0] in forbidden} == set()
+
+
+def test_no_imports_go_in_a_circle_not_even_for_types():
+    packages = ("core", "command", "operators", "ui")
+    paths = {path.relative_to(ROOT).with_suffix(""): path for name in packages for path in (ROOT / name).rglob("*.py")}
+    modules = {".".join(path.parts).removesuffix(".__init__"): file for path, file in paths.items()}
+
+    def known(name):
+        """Return the module that holds a name, or that it is."""
+        return name if name in modules else name.rpartition(".")[0]
+
+    arrows = {}
+    for module, file in modules.items():
+        inside = module.split(".") if file.name == "__init__.py" else module.split(".")[:-1]
+        names = [(len(name) - len(name.lstrip(".")), name.lstrip(".")) for name in imported(file)]
+        found = {known(".".join([*inside[: len(inside) + 1 - dots], name] if dots else [name])) for dots, name in names}
+        arrows[module] = found & modules.keys() - {module}
+    assert sum(map(len, arrows.values())) > 1000
+    TopologicalSorter(arrows).prepare()  # raises CycleError, which names the modules
 
 
 OPERATORS = {  # what each wing may import, beside itself and core

@@ -18,9 +18,9 @@ from benchmarks.samplings import (
     uneven_sphere,
 )
 from core.algebra.solvers import bounded_quadratic
+from core.geometry.arcs import arc_length
 from core.geometry.boundary import no_boundary
 from core.geometry.cloud import read_cloud
-from core.geometry.distances import arc_length
 from core.operator.areas import KernelMatrix, fast_areas, solve_areas
 from core.options import LaplacianOptions
 from core.paper import areas as paper_areas

@@ -22,11 +22,11 @@ from benchmarks.samplings import (
     torus_points,
     uneven_sphere,
 )
+from core.geometry.arcs import arc_length
 from core.geometry.bandwidth import mean_gaps
 from core.geometry.boundary import _surrounded, find_boundary, measure_boundary, no_boundary
 from core.geometry.cells import measure_cells
 from core.geometry.cloud import read_cloud
-from core.geometry.distances import arc_length
 from core.geometry.nearest import find_nearest
 from core.operator.areas import KernelMatrix
 from core.options import LaplacianOptions

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from benchmarks.samplings import fibonacci_sphere, open_cylinder
+from core.geometry.arcs import arc_length
 from core.geometry.cloud import read_cloud
-from core.geometry.distances import arc_length
 from core.geometry.edges import Sides
 from core.options import LaplacianOptions
 

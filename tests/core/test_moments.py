@@ -13,8 +13,8 @@ from benchmarks.samplings import (
     random_sphere,
     uneven_sphere,
 )
+from core.geometry.arcs import arc_length
 from core.geometry.cloud import read_cloud
-from core.geometry.distances import arc_length
 from core.geometry.pairs import Pairs, find_pairs
 from core.kernel import SECOND_MOMENT, pair_kernel
 from core.operator import weights as weights_module

@@ -307,7 +307,7 @@ def corrected_operator(
         Of (m, k) arrays: ``S y + mu2 / 8 S (h^2 S y)``, or S y if raw. Positive semi-definite.
     """
     stiffness = laplacian.dirichlet[0] if dirichlet else laplacian.stiffness
-    order, root, matrix = symmetric_form(laplacian, stiffness, report)
+    order, root, matrix = symmetric_form(stiffness, laplacian.points, laplacian.areas, laplacian.component, report)
     rows = Rows(matrix, pool, report)
     if raw:
         return order, root, lambda y: rows @ y

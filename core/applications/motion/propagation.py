@@ -60,7 +60,11 @@ class Propagator:
         self._report = report
         self.count = len(laplacian.points)
         self.order, self._root, matrix = symmetric_form(
-            laplacian, laplacian.stiffness, lambda: report("Equations", 0.0)
+            laplacian.stiffness,
+            laplacian.points,
+            laplacian.areas,
+            laplacian.component,
+            lambda: report("Equations", 0.0),
         )
         size = len(self.order)
 
