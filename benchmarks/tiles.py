@@ -20,42 +20,38 @@ from pathlib import Path
 
 import numpy as np
 import psutil
-from scipy import sparse
 
 import core
 
 from .real_shapes import noisy_points, random_points, shapes
 from .samplings import torus_points
+from .surveys import agreed_on, in_order, survey
 
 ROOT = Path(__file__).parents[1]
 PROGRAM = "import sys; from command.main import main; sys.exit(main())"
 WHOLE = 200_000  # points of the cloud that CPU seconds are held against
 NOISE = 0.2  # of the spacing
 FIRST = ("normals", "quadric_mean_curvature", "smoothing_lengths")
-SOLVED = ("areas", "mean_curvature", "stiffness")
+SOLVED = ("areas", "mean_curvature")
 LABELS = ("boundary", "component", "sides")
 
 
 def in_tiles(points, count, halo):
     """Measure a cloud in tiles; return its quantities in the order of the points, and the record."""
-    tiles = core.tiles.cut(points, count, halo)
-    agreed = core.tiles.survey(points, tiles)
-    parts = [core.tiles.measure_tile(points, tile, agreed) for tile in tiles]
-    order = np.argsort(np.concatenate([part.rows for part in parts]))
-    found = {
-        name: np.concatenate([getattr(part, name) for part in parts])[order]
-        for name in (*FIRST, *SOLVED[:-1], *LABELS[:-1])
-    }
-    found["stiffness"] = sparse.vstack([part.stiffness for part in parts]).tocsr()[order]
+    with tempfile.TemporaryDirectory() as folder:
+        store = survey(Path(folder) / "store", points, count, halo)
+        agreed = agreed_on(store)
+        core.tiles.run_steps(store)
+        found = {name: in_order(store, name) for name in (*FIRST, *SOLVED, *LABELS[:-1])}
+        share = sum(len(store.part(number).points) for number in store.alive) / len(points)
     found["sides"] = np.sign(np.einsum("ij,ij->i", found["normals"], agreed.side))
-    share = sum(len(tile.rows) for tile in tiles) / len(points)
     return found, agreed, share
 
 
 def as_a_whole(points, agreed):
     """Measure a cloud as a whole by a record."""
     whole = core.build_laplacian(points, agreed=agreed)
-    found = {name: getattr(whole, name) for name in (*FIRST, "areas", "stiffness", "boundary", "component")}
+    found = {name: getattr(whole, name) for name in (*FIRST, "areas", "boundary", "component")}
     found["mean_curvature"] = core.mean_curvature(whole)
     found["sides"] = np.sign(np.einsum("ij,ij->i", whole.normals, agreed.side))
     return found
@@ -68,7 +64,6 @@ def differences(found, wanted):
     for name in (*FIRST, "mean_curvature"):
         result[name] = np.abs(found[name] - wanted[name])[on].max() / np.abs(wanted[name])[on].max()
     result["areas"] = np.abs(found["areas"] / wanted["areas"] - 1.0)[on].max()
-    result["stiffness"] = abs(found["stiffness"] - wanted["stiffness"]).max() / abs(wanted["stiffness"]).max()
     result["total area"] = abs(found["areas"].sum() / wanted["areas"].sum() - 1.0)
     result["labels"] = sum(np.count_nonzero(found[name] != wanted[name]) for name in LABELS)
     return result

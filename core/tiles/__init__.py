@@ -1,13 +1,9 @@
 """A cloud in tiles: cut with halos, surveyed for what all must agree on, and measured one by one as within it."""
 
 from .cut import HALO as HALO
-from .cut import Tile as Tile
-from .cut import cut as cut
 from .cut import halo_of as halo_of
 from .cutting import cut_to_store as cut_to_store
 from .cutting import points_of_tile as points_of_tile
-from .measure import Measured as Measured
-from .measure import measure_tile as measure_tile
 from .modes import ask_for_modes as ask_for_modes
 from .roughness import ROUGHNESS as ROUGHNESS
 from .roughness import doubted_wavelength as doubted_wavelength
@@ -19,6 +15,5 @@ from .run import visit_tile as visit_tile
 from .seen import ORIENTS as ORIENTS
 from .store import Store as Store
 from .store import tile_folder as tile_folder
-from .survey import survey as survey
 from .workers import cores_of_worker as cores_of_worker
 from .workers import memory_of_worker as memory_of_worker

@@ -1,21 +1,13 @@
 """Tiles of a cloud: boxes of about as many points each, and a halo around them."""
 
-from __future__ import annotations
-
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from ..arguments import real, whole
 from ..cores import cores
-from ..errors import InvalidPointsError
-from ..frozen import Frozen
-from ..geometry import FEW, check_points, spacing_of
+from ..geometry import FEW, spacing_of
 from ..memory import ADAPTIVE, points_in_kernel
 from ..options import LaplacianOptions
-from ..types import Bools, Floats, Ints
+from ..types import Floats, Ints
 
 HALO = 48.0  # spacings, at which all results of a tile are those of the whole cloud to 1e-6, see docs/tiles.md
 
@@ -23,73 +15,6 @@ _ROUNDS = 2  # in which spacings are averaged
 _DEVIATIONS = 3.0  # by which counts of a sample may be off
 NARROWEST = 3.0  # halos that a tile is wide at least: below, most of the work is in the halos
 _NARROW = (NARROWEST / (NARROWEST + 2.0)) ** 2  # share of the points of a tile and its halo that are its own then
-
-
-@dataclass(frozen=True, eq=False)
-class Tile(Frozen):
-    """A box of a cloud, and a halo around it.
-
-    Attributes
-    ----------
-    rows : ndarray, (k,) int
-        Which of the cloud's points, ascending.
-    inner : ndarray, (k,) bool
-        Which of these lie in the box; each point lies in that of one tile.
-    close : ndarray, (k,) bool
-        Which lie in the box or in the nearer half of the halo: the far end tells less, as its neighbours are missing.
-    """
-
-    rows: Ints
-    inner: Bools
-    close: Bools
-
-    @property
-    def own(self) -> Ints:
-        """The rows of the points in the box."""
-        return self.rows[self.inner]
-
-
-def cut(points: ArrayLike, count: int, halo: float = HALO) -> list[Tile]:
-    """Cut a cloud into tiles by planes at medians, each across the longest side.
-
-    Parameters
-    ----------
-    points : array_like, (n, 3)
-        Coordinates [L].
-    count : int
-        How many tiles.
-    halo : float
-        How far points in them are from the nearest in the box, in spacings around them, and at least of those in it.
-
-    Returns
-    -------
-    list of Tile
-        Points at one place lie in one tile.
-
-    Raises
-    ------
-    InvalidPointsError
-        Points of a wrong shape or not finite, fewer points than tiles, or a halo that is negative.
-
-    Examples
-    --------
-    >>> import meshfree_laplacian as mf
-    >>> points = mf.example_sphere()
-    >>> print([len(tile.own) for tile in mf.tiles.cut(points, 4)])
-    [200, 200, 200, 200]
-    """
-    points = check_points(points)
-    if not 1 <= whole(count) <= len(points):
-        raise InvalidPointsError(
-            f"{count!r} tiles of {len(points)} points. Ask for at least one, and fewer than points."
-        )
-    if not real(halo) >= 0.0:
-        raise InvalidPointsError(f"A halo of {halo!r} spacings. Use a number that is not negative.")
-    spacing = spacing_around(points)
-    plan = Plan(points, int(count))
-    tile = plan.tile(points)
-    order, ends = np.argsort(tile, kind="stable"), np.cumsum(np.bincount(tile, minlength=plan.tiles))
-    return [_with_halo(points, spacing, own, halo) for own in np.split(order, ends[:-1])]
 
 
 def halo_of(options: LaplacianOptions) -> float:
@@ -249,16 +174,3 @@ def spacings_away(tree: cKDTree, usual: float, points: Floats, spacing: Floats, 
     away = tree.query(points[near], workers=cores())[0] / unit[near]
     within = away <= halo
     return near[within], away[within]
-
-
-def _with_halo(points: Floats, spacing: Floats, own: Ints, halo: float) -> Tile:
-    inner = np.zeros(len(points), dtype=bool)
-    inner[own] = True
-    others = np.flatnonzero(~inner)
-    found, away = spacings_away(
-        cKDTree(points[own]), float(np.median(spacing[own])), points[others], spacing[others], halo
-    )
-    close = inner.copy()
-    close[others[found[away <= 0.5 * halo]]] = True
-    rows = np.sort(np.concatenate([own, others[found]]))
-    return Tile(rows, inner[rows], close[rows])

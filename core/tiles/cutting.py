@@ -64,9 +64,10 @@ def cut_to_store(
     options : LaplacianOptions
         Settings.
     halo : float
-        See `cut`.
+        How far points in them are from the nearest in the box, in spacings around them, and at least of those in it.
     orient : {"outside", "up", "viewpoint"}
-        See `survey`.
+        The side that normals are on: away from the middle of each component, or up where that is a sheet, as of
+        `estimate_normals`; the side that is seen from above; or that which is seen from a place.
     viewpoint : array_like, (3,), optional
         For 'viewpoint': one place [L]; else that of the column "scanner" at each point.
     wavelength : float, optional

@@ -145,7 +145,7 @@ def measure(site: Site, solved: Solved) -> tuple[None, Told]:
 
 
 def results(laplacian: LaplaceBeltrami, label: Ints | None, rows: Ints) -> tuple[Told, list[str]]:
-    """Return the results at some points of a tile, by the names of `Measured`, and notices.
+    """Return the results at some points of a tile, by their names, and notices.
 
     Components are by labels of all, (k,).
     """

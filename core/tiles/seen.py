@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import Shape, as_array, as_doubles, check_array, check_finite
+from ..arguments import as_array, as_doubles, check_array, check_finite
 from ..errors import InvalidPointsError
 from ..files import SCANNER
 from ..geometry import Sample
@@ -50,8 +50,8 @@ def orientation(orient: str, viewpoint: Floats | None, columns: Iterable[str]) -
     return record
 
 
-def checked_viewpoint(viewpoint: ArrayLike | None, count: int = 0) -> Floats | None:
-    """Check one place, (3,), or that of the scanner of each of some points, (count, 3), and return it.
+def checked_viewpoint(viewpoint: ArrayLike | None) -> Floats | None:
+    """Check a place, (3,), and return it.
 
     Raises
     ------
@@ -60,9 +60,8 @@ def checked_viewpoint(viewpoint: ArrayLike | None, count: int = 0) -> Floats | N
     """
     if viewpoint is None:
         return None
-    advice = f"Give one position of three numbers{f', or one for each of {count} points' if count else ''}."
-    shapes: list[Shape] = [(3,), (count, 3)] if count else [(3,)]
-    given = as_doubles(check_array(as_array(viewpoint, "Viewpoints"), "Viewpoints", shapes, advice))
+    advice = "Give one position of three numbers."
+    given = as_doubles(check_array(as_array(viewpoint, "Viewpoints"), "Viewpoints", [(3,)], advice))
     check_finite(given.reshape(-1, 3), "viewpoints", advice)
     return given
 

@@ -6,6 +6,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 import core
+from benchmarks.surveys import in_order, survey
 from core.geometry import find_nearest
 from core.geometry.rounding import find_rounding, smooth_rounded
 
@@ -106,22 +107,21 @@ def test_points_that_noise_lifts_by_one_step_only_now_and_then_are_no_strays():
     assert core.stray_points(points).mean() <= 0.001
 
 
-def test_tiles_agree_on_the_direction():
+def test_tiles_agree_on_the_direction(tmp_path):
     """Those on which all points are on one level, too, which alone would not be known to be rounded."""
     points, level = _sheet(0.0), _sheet(0.0, noise=0.0)
     quiet = level @ _TURNED[:, 0] < -0.003
     points[quiet] = level[quiet]
     whole = core.build_laplacian(points)
-    parts = core.tiles.cut(points, 8, 5.0)
-    assert not all(find_rounding(cKDTree(points[tile.rows])).any() for tile in parts)
-    assert abs(core.tiles.survey(points, parts).rounded @ _TURNED[:, 2]) > 0.8
-    parts = core.tiles.cut(points, 4, core.tiles.HALO)
-    for agreed, rtol in ((whole.agreed, 1e-4), (core.tiles.survey(points, parts), 5e-3)):
-        found = [core.tiles.measure_tile(points, tile, agreed) for tile in parts]
-        order = np.argsort(np.concatenate([part.rows for part in found]))
-        areas = np.concatenate([part.areas for part in found])[order]
-        assert abs(areas.sum() / whole.areas.sum() - 1.0) < 0.01 * rtol
-        np.testing.assert_allclose(areas, whole.areas, rtol=0.0, atol=rtol * whole.areas.max())
+    rounded = survey(tmp_path / "narrow", points, 8, 5.0)
+    parts = [rounded.part(number).points for number in range(rounded.count)]
+    assert not all(find_rounding(cKDTree(part)).any() for part in parts)
+    assert abs(rounded.record["rounded"] @ _TURNED[:, 2]) > 0.8
+    store = survey(tmp_path / "wide", points, 4)
+    core.tiles.run_steps(store)
+    areas = in_order(store, "areas")
+    assert abs(areas.sum() / whole.areas.sum() - 1.0) < 5e-5
+    np.testing.assert_allclose(areas, whole.areas, rtol=0.0, atol=5e-3 * whole.areas.max())
 
 
 def _grid(size):

@@ -5,10 +5,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scipy import sparse
 from scipy.spatial import cKDTree
 
 import core
+from benchmarks.surveys import agreed_among, agreed_on, in_order, survey
 from core.geometry import Agreed, find_nearest
 from core.geometry.boundary import no_boundary
 from core.geometry.moments import least_error
@@ -49,43 +49,28 @@ def whole(kind):
     return core.build_laplacian(rods(kind))
 
 
-@cache
-def tiles(kind):
-    return core.tiles.cut(rods(kind), 4, core.tiles.HALO)
-
-
-@cache
-def surveyed(kind):
-    return core.tiles.survey(rods(kind), tiles(kind))
-
-
-def joined(points, parts, agreed):
-    found = [core.tiles.measure_tile(points, tile, agreed) for tile in parts]
-    order = np.argsort(np.concatenate([part.rows for part in found]))
-    result = {
-        name: np.concatenate([getattr(part, name) for part in found])[order]
-        for name in (quantity.name for quantity in fields(core.tiles.Measured))
-        if name not in ("stiffness", "notices")
-    }
-    return result, sparse.vstack([part.stiffness for part in found]).tocsr()[order]
+@pytest.fixture(scope="module", params=KINDS)
+def walk(request, tmp_path_factory):
+    """A cloud in four tiles on disk, measured: its kind, the store, and what was agreed on."""
+    store = survey(tmp_path_factory.mktemp("tiles") / "store", rods(request.param), 4)
+    agreed = agreed_on(store)
+    core.tiles.run_steps(store)
+    return request.param, store, agreed
 
 
 def same(left, right, rtol):
     np.testing.assert_allclose(left, right, rtol=0.0, atol=rtol * np.abs(right).max())
 
 
-def assert_alike(result, laplacian, rtol):
+def assert_alike(store, laplacian, rtol):
     """Assert that joined tiles are the operator."""
-    values, stiffness = result
     on = laplacian.component >= 0
     for name in ("normals", "quadric_mean_curvature", "gaussian_curvature", "smoothing_lengths", "areas", "trust"):
-        same(values[name][on], getattr(laplacian, name)[on], rtol)
-    same(values["mean_curvature"][on], core.mean_curvature(laplacian)[on], rtol)
-    assert abs(stiffness - laplacian.stiffness).max() <= rtol * abs(laplacian.stiffness).max()
-    np.testing.assert_array_equal(values["boundary"], laplacian.boundary)
-    np.testing.assert_array_equal(values["component"], laplacian.component)
-    np.testing.assert_array_equal(values["doubt"], laplacian.doubt)
-    assert abs(values["areas"].sum() / laplacian.areas.sum() - 1.0) < 1e-9
+        same(in_order(store, name)[on], getattr(laplacian, name)[on], rtol)
+    same(in_order(store, "mean_curvature")[on], core.mean_curvature(laplacian)[on], rtol)
+    for name in ("boundary", "component", "doubt"):
+        np.testing.assert_array_equal(in_order(store, name), getattr(laplacian, name))
+    assert abs(in_order(store, "areas").sum() / laplacian.areas.sum() - 1.0) < 1e-9
 
 
 class TestAgreed:
@@ -125,47 +110,53 @@ def test_spacing_is_even_around_random_points():
 
 
 class TestTiles:
-    @pytest.mark.parametrize("kind", KINDS)
-    def test_divide_the_points(self, kind):
-        own = np.concatenate([tile.own for tile in tiles(kind)])
-        np.testing.assert_array_equal(np.sort(own), np.arange(len(rods(kind))))
-        assert max(len(tile.rows) for tile in tiles(kind)) < 0.8 * len(rods(kind))
+    def test_divide_the_points(self, walk):
+        kind, store, _ = walk
+        rows = [store.columns(number)["row"] for number in range(store.count)]
+        np.testing.assert_array_equal(np.sort(np.concatenate(rows)), np.arange(len(rods(kind))))
+        assert max(len(store.part(number).points) for number in range(store.count)) < 0.8 * len(rods(kind))
 
-    def test_have_halos_of_the_points_near_their_own(self):
+    def test_have_halos_of_the_points_near_their_own(self, tmp_path):
         points, halo = rods("several"), 10.0
-        spacing = spacing_around(points)
-        for tile in core.tiles.cut(points, 4, halo):
-            distance = cKDTree(points[tile.own]).query(points)[0]
-            away = distance / np.maximum(spacing, np.median(spacing[tile.own]))
-            np.testing.assert_array_equal(tile.rows, np.flatnonzero(away <= halo))
-            np.testing.assert_array_equal(tile.close, away[tile.rows] <= 0.5 * halo)
+        store = survey(tmp_path / "store", points, 4, halo)
+        spacing = np.empty(len(points))
+        rows = [store.columns(number)["row"] for number in range(store.count)]
+        for own in rows:
+            spacing[own] = spacing_around(points[own])
+        for number, (_, among) in enumerate(agreed_among(store)):
+            own, part = rows[number], store.part(number)
+            distance = cKDTree(points[own]).query(points)[0]
+            away = distance / np.maximum(spacing, np.median(spacing[own]))
+            np.testing.assert_array_equal(np.sort(among), np.flatnonzero(away <= halo))
+            np.testing.assert_array_equal(part.close, away[among] <= 0.5 * halo)
+            np.testing.assert_array_equal(part.points, points[among])
 
-    def test_hold_points_at_one_place_together(self):
+    def test_hold_points_at_one_place_together(self, tmp_path):
         points = np.repeat(np.random.default_rng(0).random((50, 3)), 3, axis=0)
-        for tile in core.tiles.cut(points, 4, 0.0):
-            assert set(tile.own // 3) == {row // 3 for row in tile.own if list(tile.own // 3).count(row // 3) == 3}
+        store = core.tiles.cut_to_store(lambda: [(points, {"row": np.arange(150)})], tmp_path / "store", 40)
+        for number in range(store.count):
+            own = store.columns(number)["row"]
+            assert np.all(np.bincount(own // 3)[own // 3] == 3)
 
-    def test_are_not_more_than_the_points(self):
-        with pytest.raises(core.InvalidPointsError, match="5 tiles of 4 points"):
-            core.tiles.cut(np.eye(4, 3), 5)
-        with pytest.raises(core.InvalidPointsError, match="halo"):
-            core.tiles.cut(np.eye(4, 3), 2, -1.0)
+    def test_are_measured_as_the_whole(self, walk):
+        kind, store, _ = walk
+        assert_alike(store, whole(kind), 1e-5 if kind == "noisy" else 1e-6)
 
-    @pytest.mark.parametrize("kind", KINDS)
-    def test_are_measured_as_within_the_whole(self, kind):
-        result = joined(rods(kind), tiles(kind), whole(kind).agreed)
-        assert_alike(result, whole(kind), 1e-5 if kind == "noisy" else 1e-6)
-
-    @pytest.mark.parametrize("kind", KINDS)
-    def test_are_measured_as_the_whole_by_the_defaults_of_both(self, kind):
-        result = joined(rods(kind), tiles(kind), surveyed(kind))
-        assert_alike(result, whole(kind), 1e-5 if kind == "noisy" else 1e-6)
+    def test_are_rows_of_the_matrix_of_the_whole_by_its_record(self, walk):
+        kind, store, _ = walk
+        points, laplacian, rtol = rods(kind), whole(kind), 1e-5 if kind == "noisy" else 1e-6
+        for number, (_, rows) in enumerate(agreed_among(store)):
+            part = core.build_laplacian(points[rows], agreed=laplacian.agreed.among(rows, len(points)))
+            own = slice(len(store.own(number)))
+            wanted = laplacian.stiffness[rows[own]]
+            assert abs(part.stiffness[own] - wanted[:, rows]).max() <= rtol * abs(laplacian.stiffness).max()
+            assert np.isin(wanted.indices, rows).all()
 
 
 class TestSurvey:
-    @pytest.mark.parametrize("kind", KINDS)
-    def test_finds_what_the_whole_decides(self, kind):
-        found, known = surveyed(kind), whole(kind).agreed
+    def test_finds_what_the_whole_decides(self, walk):
+        kind, _, found = walk
+        known = whole(kind).agreed
         for name in ("center", "scale", "spacing", "reach"):
             np.testing.assert_allclose(getattr(found, name), getattr(known, name), rtol=1e-12, atol=1e-15)
         for name in ("component", "sheet", "smallest", "noisy"):
@@ -173,17 +164,16 @@ class TestSurvey:
         on = known.sheet >= 0
         assert np.all(np.einsum("ij,ij->i", found.side, known.side)[on] > 0.0)
 
-    def test_does_not_depend_on_the_cut(self):
-        points = rods("several")
-        turned = points @ np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
-        other = core.tiles.cut(turned, 3, core.tiles.HALO)
-        found, known = core.tiles.survey(points, other), surveyed("several")
-        np.testing.assert_allclose(found.ratio, known.ratio, rtol=1e-6)
+    def test_does_not_depend_on_the_cut(self, walk, tmp_path):
+        kind, store, known = walk
+        turned = rods(kind) @ np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+        other = survey(tmp_path / "store", turned, 3)
+        found, rtol = agreed_on(other), 1e-5 if kind == "noisy" else 1e-6
+        core.tiles.run_steps(other)
+        np.testing.assert_allclose(found.ratio, known.ratio, rtol=rtol)
         np.testing.assert_array_equal(found.sheet, known.sheet)
-        first, second = joined(points, other, found), joined(points, tiles("several"), known)
-        assert abs(first[1] - second[1]).max() <= 1e-6 * abs(second[1]).max()
-        for name in ("areas", "mean_curvature", "normals"):
-            same(first[0][name], second[0][name], 1e-6)
+        for name in ("areas", "mean_curvature"):
+            same(in_order(other, name), in_order(store, name), rtol)
 
 
 def test_errors_of_moments_do_not_depend_on_which_points_are_asked_together():
@@ -205,48 +195,45 @@ class TestLabels:
         np.testing.assert_array_equal(sign, [1.0, -1.0, 1.0, 1.0])
 
 
-def test_points_that_fill_volumes_are_judged_alike_however_the_cloud_is_cut():
+def test_points_that_fill_volumes_are_judged_alike_however_the_cloud_is_cut(tmp_path):
     rng = np.random.default_rng(0)
     ground = np.column_stack([rng.uniform(0.0, 40.0, 3000), rng.uniform(0.0, 10.0, 3000), np.zeros(3000)])
     leaves = [
         size * rng.normal(size=(400, 3)) + place for size, place in ((0.8, [8.0, 5.0, 6.0]), (1.4, [30.0, 5.0, 6.0]))
     ]
     points = np.concatenate([ground, *leaves])
-    first, second = (core.tiles.survey(points, core.tiles.cut(points, count, 6.0)).filling for count in (2, 5))
+    first, second = (survey(tmp_path / str(count), points, count, 6.0).record["filling"] for count in (2, 5))
     assert first[0] > 0.4  # of the spacing
     np.testing.assert_allclose(first, second, rtol=1e-9)
 
 
-def test_sides_where_sheets_come_close_are_those_of_the_whole():
+def test_sides_where_sheets_come_close_are_those_of_the_whole(tmp_path):
     rng = np.random.default_rng(1)
     along, angle = rng.uniform(0.0, LENGTH, 3000), rng.uniform(0.0, 2.0 * np.pi, 3000)
     points = np.column_stack([along, 0.25 * np.cos(angle), 0.05 * np.sin(angle)])  # a flat tube
-    found = core.tiles.survey(points, core.tiles.cut(points, 4, core.tiles.HALO)).side
+    found = agreed_on(survey(tmp_path / "store", points, 4)).side
     wanted = core.build_laplacian(points).agreed
     on = wanted.side.any(axis=1)
     assert np.mean(on) > 0.99
     assert np.all(np.einsum("ij,ij->i", found, wanted.side)[on] > 0.0)
 
 
-def test_curves_are_no_surface_in_tiles_either():
+def test_curves_are_no_surface_in_tiles_either(tmp_path):
     angle = np.linspace(0.0, 2.0 * np.pi, 3000, endpoint=False)
     circle = np.column_stack([np.cos(angle), np.sin(angle), 0.2 * np.sin(3.0 * angle)])
     with pytest.raises(core.NotASurfaceError, match="along a curve"):
-        core.tiles.survey(circle, core.tiles.cut(circle, 3, 10.0))
+        survey(tmp_path / "store", circle, 3, 10.0)
 
 
-def test_one_smoothing_length_is_that_of_the_whole():
+def test_one_smoothing_length_is_that_of_the_whole(tmp_path):
     options = core.LaplacianOptions(bandwidth="global", neighbors=30, bandwidth_factor=0.5)
     points = rods("several")[3000:]  # a quarter of the long one, and all else
     laplacian = core.build_laplacian(points, options=options)
-    parts = core.tiles.cut(points, 2, core.tiles.HALO)
-    agreed = core.tiles.survey(points, parts, options)
-    np.testing.assert_allclose(agreed.length, laplacian.agreed.length, rtol=1e-12)
-    found = [core.tiles.measure_tile(points, tile, agreed, options) for tile in parts]
-    for name in ("areas", "mean_curvature"):
-        values = np.concatenate([getattr(part, name) for part in found])
-        known = laplacian.areas if name == "areas" else core.mean_curvature(laplacian)
-        same(values, known[np.concatenate([part.rows for part in found])], 1e-6)
+    store = survey(tmp_path / "store", points, 2, options=options)
+    np.testing.assert_allclose(store.record["length"], laplacian.agreed.length, rtol=1e-12)
+    core.tiles.run_steps(store)
+    same(in_order(store, "areas"), laplacian.areas, 1e-6)
+    same(in_order(store, "mean_curvature"), core.mean_curvature(laplacian), 1e-6)
 
 
 def test_halos_are_as_wide_as_kernels_ask_for():

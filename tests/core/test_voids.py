@@ -9,6 +9,7 @@ from scipy.sparse.linalg import eigsh
 
 import core
 from benchmarks.samplings import fibonacci_sphere, random_sphere, torus_points
+from benchmarks.surveys import in_order, survey
 from core.geometry.boundary import measure_boundary, no_boundary
 from core.geometry.cells import measure_cells
 from core.geometry.cloud import read_cloud
@@ -213,7 +214,7 @@ def test_the_furthest_corner_of_a_cell_is_as_far_as_its_radius_and_no_point_is_n
     np.testing.assert_allclose(distance, cells.radius[inner, None] * np.ones(3), rtol=1e-9)
 
 
-def test_slits_are_the_same_in_tiles_as_in_the_whole():
+def test_slits_are_the_same_in_tiles_as_in_the_whole(tmp_path):
     """A strip of four tiles, with one slit across their borders, one within a tile, and one that is told."""
     rng = np.random.default_rng(5)
     points = np.column_stack([rng.uniform(-6.0, 6.0, 6_000), rng.uniform(-0.3, 0.3, 6_000), np.zeros(6_000)])
@@ -224,11 +225,9 @@ def test_slits_are_the_same_in_tiles_as_in_the_whole():
     whole = core.build_laplacian(points)
     assert np.count_nonzero(whole.boundary & (np.abs(points[:, 1]) < 0.2)) > 150
     assert any(ACROSS in notice for notice in whole.notices)
-    tiles = core.tiles.cut(points, 4, core.tiles.HALO)
-    assert max(len(tile.rows) for tile in tiles) < 0.8 * len(points)
-    agreed = core.tiles.survey(points, tiles)
-    for tile in tiles:
-        found = core.tiles.measure_tile(points, tile, agreed)
-        np.testing.assert_array_equal(found.boundary, whole.boundary[found.rows])
-        # The course of a short boundary goes by how long it is, and halos end within slits.
-        np.testing.assert_allclose(found.areas, whole.areas[found.rows], rtol=0.0, atol=1e-4 * whole.areas.max())
+    store = survey(tmp_path / "store", points, 4)
+    core.tiles.run_steps(store)
+    assert max(len(store.part(number).points) for number in range(store.count)) < 0.8 * len(points)
+    np.testing.assert_array_equal(in_order(store, "boundary"), whole.boundary)
+    # The course of a short boundary goes by how long it is, and halos end within slits.
+    np.testing.assert_allclose(in_order(store, "areas"), whole.areas, rtol=0.0, atol=1e-4 * whole.areas.max())

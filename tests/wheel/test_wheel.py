@@ -109,7 +109,7 @@ import meshfree_laplacian as mf
 laplacian = mf.build_laplacian(np.zeros((5, 3)), options=mf.LaplacianOptions(neighbors=6))
 count: int = len(laplacian.eigenpairs(3).eigenvalues)
 version: str = mf.__version__
-tile: mf.tiles.Tile = mf.tiles.cut(laplacian.points, 2)[0]
+store: mf.tiles.Store = mf.tiles.Store("store")
 mf.LaplacianOptions(neighbours=6)
 areas: str = laplacian.areas
 """
