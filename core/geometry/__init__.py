@@ -53,6 +53,6 @@ from .sample import Sample
 from .scaled import ScaledPoints
 from .sheets import choose_bridges, join_touching, sheet_neighbors
 from .strays import PARTS, label_parts, stray_scores, without
-from .subset import FINEST, blue_noise_subset, independent, mix_bits
-from .thinning import nearest_in_blocks, thin
+from .subset import FINEST, blue_noise_subset, mix_bits
+from .thinning import NEIGHBORS, apart, nearest_in_blocks, thin
 from .winding import orient_patches

@@ -7,11 +7,11 @@ from scipy.spatial import cKDTree
 
 from ..algebra import blocks
 from ..cores import cores
-from ..types import Bools, Floats, Ints, Report
+from ..types import Array, Bools, Floats, Ints, Report
 from .subset import independent
 
 _STEP = 2.0  # each pass leaves a quarter of the points
-_NEIGHBORS = 25  # the point itself and more than a pass lets go of
+NEIGHBORS = 25  # the point itself and more than a pass lets go of
 _FILL = 0.49  # points that stay in a square whose side is their least distance, about
 _SEED = 0
 _BLOCK = 1 << 15
@@ -65,15 +65,21 @@ def thin(
     chosen = np.arange(n)
     for step in range(passes):
         share = reach[chosen] / _STEP ** (passes - 1 - step)
-        chosen = chosen[_independent(points[chosen], share, priority[chosen], rank[chosen], report)]
+        chosen = chosen[apart(points[chosen], share, -priority[chosen], rank[chosen], report)]
     return chosen
 
 
-def _independent(points: Floats, reach: Floats, priority: Ints, rank: Ints, report: Report) -> Bools:
-    """Return which points have none of a higher priority within reach that stays, (m,) bool."""
-    pairs = [_close_pairs(*found, reach, rank) for found in nearest_in_blocks(points, points, _NEIGHBORS, report)]
+def apart(points: Floats, reach: Floats | float, order: Array, rank: Ints | None, report: Report) -> Bools:
+    """Return which points have none before them, in their order, within reach that stays, (m,) bool.
+
+    Among as many neighbours as are looked at; the reach of two points is the mean of theirs, (m,) or one for all [L],
+    and those of different ranks above zero, (m,) int, do not displace each other.
+    """
+    reach = np.broadcast_to(reach, len(points))
+    rank = np.zeros(len(points), dtype=np.int64) if rank is None else rank
+    pairs = [_close_pairs(*found, reach, rank) for found in nearest_in_blocks(points, points, NEIGHBORS, report)]
     first, second = (np.concatenate(ends) for ends in zip(*pairs, strict=True))
-    return independent(first, second, -priority, report)
+    return independent(first, second, order, report)
 
 
 def _close_pairs(start: int, distance: Floats, index: Ints, reach: Floats, rank: Ints) -> tuple[Ints, Ints]:

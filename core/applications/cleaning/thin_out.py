@@ -9,11 +9,10 @@ from scipy.spatial import cKDTree
 from ...arguments import check_switches, real, whole
 from ...cores import cores
 from ...errors import InvalidPointsError, PointCloudError
-from ...geometry import check_points, independent, nearest_in_blocks
+from ...geometry import NEIGHBORS, apart, check_points, nearest_in_blocks
 from ...progress import ends_at_one
-from ...types import Bools, Floats, Ints, Progress, Report
+from ...types import Floats, Ints, Progress, Report
 
-_AROUND = 25  # the point itself and its neighbours: more than a pass of twice the distance lets go of
 _SPACING = 12  # of them that tell the spacing
 _STEP = 2.0  # each pass doubles the distance
 _DISCS = 0.7  # points a squared distance that stay on an area of one
@@ -104,7 +103,7 @@ def thin_out(
 def _measure(points: Floats, report: Report) -> tuple[float, Floats]:
     """Return the area of the surface, by the spacings, and the surface variation at each point, (n,)."""
     area, variation = 0.0, np.empty(len(points))
-    for start, distance, index in nearest_in_blocks(points, points, _AROUND, report):
+    for start, distance, index in nearest_in_blocks(points, points, NEIGHBORS, report):
         last = min(_SPACING, index.shape[1] - 1)
         area += np.sum(np.pi / max(last, 1) * distance[:, last] ** 2)
         offset = points[index] - points[index].mean(axis=1, keepdims=True)
@@ -181,17 +180,6 @@ def _by_passes(points: Floats, chosen: Ints, order: Ints, area: float, distance:
     passes = max(1, int(np.ceil(np.log(max(len(points) / fewest, 1.0)) / np.log(_STEP**2))))
     for step in range(passes):
         reach = distance / _STEP ** (passes - 1 - step)
-        while not (alone := _independent(points[chosen], reach, order[chosen], report)).all():
+        while not (alone := apart(points[chosen], reach, order[chosen], None, report)).all():
             chosen = chosen[alone]
     return chosen
-
-
-def _independent(points: Floats, reach: float, order: Ints, report: Report) -> Bools:
-    """Return which points have none before them within reach that stays, among as many neighbours as are looked at."""
-    ends = [np.empty((2, 0), dtype=np.int64)]
-    for start, distance, index in nearest_in_blocks(points, points, _AROUND, report):
-        row, column = np.nonzero(distance < reach)
-        pair = np.stack([row + start, index[row, column]])
-        ends.append(pair[:, pair[0] != pair[1]])
-    first, second = np.concatenate(ends, axis=1)
-    return independent(first, second, order, report)
