@@ -14,10 +14,11 @@ import numpy as np
 import core
 from core.geometry.cloud import read_cloud
 from core.operator.areas import KernelMatrix, fast_areas
-from core.paper.areas import algorithm_1, constrained_areas, regularized_areas
+from core.paper.areas import constrained_areas, regularized_areas
 from core.paper.operator import symmetrized_operator
 
 from .accuracy import relative
+from .paper.descent import algorithm_1
 from .samplings import random_sphere, sphere_eigenvalues, uneven_sphere
 from .tables import Table
 

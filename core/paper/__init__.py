@@ -1,6 +1,5 @@
 """The paper as it stands, equation by equation: its area elements, its normals, its operator, its theorem."""
 
-from .areas import algorithm_1 as algorithm_1
 from .areas import constrained_areas as constrained_areas
 from .areas import regularized_areas as regularized_areas
 from .normals import covariance_normals as covariance_normals
