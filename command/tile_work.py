@@ -264,8 +264,7 @@ def _imported():
 def _client(address):
     """Connect to a scheduler."""
     _, distributed = _imported()
-    for name in ("distributed", "asyncio"):  # what they tell is told in words of one's own
-        logging.getLogger(name).setLevel(logging.CRITICAL)
+    _silence()
     try:
         client = distributed.Client(address, timeout=_CONNECTING)
     except (OSError, ValueError, TypeError) as error:  # no answer, or no address at all
@@ -275,6 +274,13 @@ def _client(address):
         ) from error
     with client:
         yield client
+
+
+def _silence():
+    """Let Dask log nothing, by any of its loggers, most of which have their own level: we tell what matters of it."""
+    for name in list(logging.root.manager.loggerDict):
+        if name.partition(".")[0] in ("asyncio", "distributed"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
 def _brief(error):
@@ -305,7 +311,7 @@ def workers(count, address):
     with contextlib.ExitStack() as stack:
         if not address:
             spawned = {_SPAWNED: dask.config.get(_SPAWNED) | DASK[_SPAWNED] | _QUIET}
-            logging.getLogger("distributed").setLevel(logging.CRITICAL)
+            _silence()
             stack.enter_context(dask.config.set({**DASK, **_LOCAL, **spawned}))
             address = distributed.LocalCluster(
                 n_workers=count,
