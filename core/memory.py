@@ -107,8 +107,10 @@ def check_room(count: int, each: int, advice: str = "Use fewer points, or free m
 
     Examples
     --------
+    >>> import numpy as np
     >>> import meshfree_laplacian as mf
-    >>> mf.check_room(1_000, each=200)
+    >>> points = mf.example_sphere()
+    >>> mf.check_room(len(points), each=200)
     """
     free = available_memory()
     most = None if free is None else int(_SHARE * free / each)
