@@ -8,6 +8,7 @@ ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted(ROOT.glob("docs/**/*.md"))]
 _FENCED = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _INDENTED = re.compile(r"(?<=\n\n) {4}.*\n(?:\n* {4}.*\n)*")
+_ITEM = re.compile(r"^\d+\. .*\n(?:\n* {3,}.*\n)*", re.MULTILINE)  # of a list, whose paragraphs are indented, too
 _INLINE = re.compile(r"(?<!`)`([^`\n]+)`(?!`)")
 _SHELL = r"(?:[A-Z_]+=\S+ )*(make|blender|python|pip|meshfree|openjd|bash) \S.*"
 _TYPED = re.compile(rf"{_SHELL}|bpy\.ops\.\w+\..*")
@@ -75,10 +76,11 @@ def typed():
         for language, code in _FENCED.findall(text):
             yield Snippet(page, code, _kind(code) if language == "python" else language)
         text = _FENCED.sub("", text)
+        items, text = "".join(_ITEM.findall(text)), _ITEM.sub("", text)
         for block in _INDENTED.findall(text):
             for one in _parts(re.sub(r"^ {4}", "", block, flags=re.MULTILINE)):
                 yield Snippet(page, one, _kind(one))
-        for code in _INLINE.findall(_INDENTED.sub("", text)):
+        for code in _INLINE.findall(_INDENTED.sub("", text) + items):
             if _TYPED.fullmatch(code):
                 yield Snippet(page, code, _kind(code))
 
