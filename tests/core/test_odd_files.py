@@ -190,7 +190,8 @@ class TestGrids:
 
     def rows(self, missing, upwards=False, wrap=None):
         words = [
-            missing if gap else repr(height) for height, gap in zip(self.HEIGHTS.flat, self.GAPS.flat, strict=True)
+            missing if gap else repr(float(height))
+            for height, gap in zip(self.HEIGHTS.flat, self.GAPS.flat, strict=True)
         ]
         wrap = wrap or self.COLUMNS
         rows = [" ".join(words[index : index + wrap]) for index in range(0, len(words), wrap)]
