@@ -33,8 +33,8 @@ class Cells:
     radius : ndarray, (m,)
         Distance of the furthest corner: the radius of the largest empty disc that touches the point. Half an even
         spacing or a little more; larger where points are irregular, or sparser in one direction than in the other.
-    corner : ndarray, (m, 3)
-        The way to it in the tangent plane, where that disc has its center.
+    corner : ndarray, (m, 2)
+        The way to it, where that disc has its center, along the tangents of `frames`.
     """
 
     areas: Floats
@@ -83,7 +83,7 @@ def measure_cells(
     count = len(normals)
     component = np.zeros(count, dtype=int) if component is None else component
     if before is None:
-        cells, rows = Cells(np.empty(count), np.empty(count), np.empty((count, 3))), np.arange(count)
+        cells, rows = Cells(np.empty(count), np.empty(count), np.empty((count, 2))), np.arange(count)
     else:
         cells = Cells(before.areas.copy(), before.radius.copy(), before.corner.copy())
         rows = np.flatnonzero(boundary.distance[:, 0] < np.maximum(nearest.distance[:, -1], before.radius))
@@ -105,8 +105,7 @@ def measure_cells(
                 areas[gaps], corner[gaps], _ = _intersect(capped, gaussian_curvature[block[gaps]], np.inf)
                 known = np.arange(len(block))
             cells.areas[block[known]], cells.radius[block[known]] = areas[known], np.linalg.norm(corner[known], axis=1)
-            along = frames(normals[block[known]])[:, :, 1:]
-            cells.corner[block[known]] = np.einsum("ick,ik->ic", along, corner[known])
+            cells.corner[block[known]] = corner[known]
             still_open[block] = ~closed & (whole[block] | (many < COUNT))
 
         on_all_cores(measure, blocks(len(rows), _BLOCK * COUNT // max(many, COUNT)), report)
@@ -141,8 +140,9 @@ def _cuts(
     index, distance, counted, joined = index[:, 1:], distance[:, 1:], counted[:, 1:], joined[:, 1:]
     around = normals if sides is None else sides.around
     chord, frame = chords(nearest.points, rows, index), frames(normals[rows])[:, :, 1:]
-    side = np.where(heights_of_ends(chord, around, rows, index)[0] < 0.0, -1.0, 1.0)
     cosine, left, right = heights_of_ends(chord, normals, rows, index)
+    turned = cosine if around is normals else sum(part[rows, None] * gathered(part, index) for part in around.T)
+    side = np.where(turned < 0.0, -1.0, 1.0)
     cosine, right = side * cosine, side * right
     squared, ahead = arc_squared(distance**2, left, right, cosine), arc_ahead(left, right)
     if sides is not None:

@@ -217,7 +217,7 @@ def measure_surface(
     edge = locate_boundary(sample, oriented, gaps if found else None, boundary, boundary_distance)
     if np.isfinite(edge.distance).any():
         cells = cells_within(edge, cells)
-    voids = find_voids(nearest, cells, gaps, sample.scatter[1]) if found else no_voids()
+    voids = find_voids(nearest, sides.normals, cells, gaps, sample.scatter[1]) if found else no_voids()
     if len(voids.rims):
         edge = measure_boundary(nearest, oriented, as_mask(voids.rims, len(oriented)) | edge.at_boundary)
         cells = cells_within(edge, cells)
@@ -227,9 +227,7 @@ def measure_surface(
     pairs = Pairs(nearest.points, lengths, *first_and_second)
     parted = edge.parting(nearest.tree, sides.normals, pairs.first, pairs.second, gaps)
     if len(parted):
-        joined = np.ones(len(pairs.first), dtype=bool)
-        joined[parted] = False
-        pairs = pairs.keep(joined)
+        pairs = pairs.keep(~as_mask(parted, len(pairs.first)))
     own = oriented if given is None else given
 
     report("Neighbors", 0.4)

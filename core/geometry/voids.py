@@ -13,7 +13,7 @@ from .boundary import HOLE, PROBE, SURE, VOID
 from .cells import Cells
 from .components import label_connected
 from .nearest import ENOUGH, NEXT, ON, ROW, Nearest
-from .quadrics import fit_quadrics
+from .quadrics import fit_quadrics, frames
 from .sample import Sample
 
 _TOLD = 30.0  # that of a void that is told though it is no slit; of 300,000 random points none had above 16
@@ -66,7 +66,7 @@ def no_voids() -> Voids:
     return Voids(none, none, none, np.zeros(0))
 
 
-def find_voids(nearest: Nearest, cells: Cells, gaps: Floats, scatter: Floats) -> Voids:
+def find_voids(nearest: Nearest, normals: Floats, cells: Cells, gaps: Floats, scatter: Floats) -> Voids:
     """Find voids by the empty discs around the furthest corners of Voronoi cells.
 
     Random points leave single discs twice as wide as usual, uneven ones larger and more of them, but no row of them
@@ -76,6 +76,8 @@ def find_voids(nearest: Nearest, cells: Cells, gaps: Floats, scatter: Floats) ->
     ----------
     nearest : Nearest
         Of m points.
+    normals : ndarray, (m, 3)
+        Those that the cells were measured with.
     cells : Cells
         Of the points, within the boundary that is known.
     gaps : ndarray, (m,)
@@ -89,16 +91,16 @@ def find_voids(nearest: Nearest, cells: Cells, gaps: Floats, scatter: Floats) ->
     """
     found = (cells.radius > VOID * gaps) & (cells.radius < PROBE * gaps)
     rows = np.flatnonzero(found & (scatter < ON))
-    usual = np.zeros(len(rows))
+    usual, corner = np.zeros(len(rows)), np.einsum("ick,ik->ic", frames(normals[rows])[:, :, 1:], cells.corner[rows])
     for way in (-1.0, 3.0):  # as far from either side of the disc as its center
-        there = nearest.tree.query(nearest.points[rows] + way * cells.corner[rows], workers=cores())[1]
+        there = nearest.tree.query(nearest.points[rows] + way * corner, workers=cores())[1]
         usual = np.maximum(usual, cells.radius[nearest.index[there, : NEXT + 1]].mean(axis=1))
     weight = nearest.weight[rows]
     own = np.einsum("ik,ik->i", weight, cells.areas[nearest.index[rows]]) / weight.sum(axis=1)
     usual *= np.maximum(1.0, gaps[rows] * np.sqrt(np.pi / own) / SURE)  # cells are long and narrow there
     wide = cells.radius[rows] > VOID * usual
     rows, usual = rows[wide], usual[wide]
-    center = nearest.points[rows] + cells.corner[rows]
+    center = nearest.points[rows] + corner[wide]
     # Where the surface bends within the disc, other points are nearer to its center. Between rows, and where points
     # fill a volume, there are voids without an end.
     found = nearest.tree.query(center, workers=cores())[0] > cells.radius[rows] - ON * usual
