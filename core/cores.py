@@ -1,5 +1,6 @@
 """How many processor cores to use."""
 
+import functools
 import math
 import os
 from collections.abc import Iterable, Iterator
@@ -27,7 +28,13 @@ def cores() -> int:
             raise PointCloudError(f"{VARIABLE} is {text!r}. Let it be a whole number of at least 1, or remove it.")
         return int(text)
     given = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return min([given, *_group_cores(groups_of("cpu"))])
+    return min([given, *_limits()])
+
+
+@functools.cache
+def _limits() -> tuple[int, ...]:
+    """Return the limits of the control groups of this process, read once: each search for neighbors asks for them."""
+    return tuple(_group_cores(groups_of("cpu")))
 
 
 def _group_cores(groups: Iterable[Path]) -> Iterator[int]:
