@@ -65,7 +65,7 @@ def points_that_fit(options: LaplacianOptions, modes: int = 0) -> int | None:
         None where the free memory is unknown.
     """
     free = available_memory()
-    return None if free is None else int(_SHARE * free / needed_memory(1, options, modes))
+    return None if free is None else _fitting(free, needed_memory(1, options, modes))
 
 
 def check_memory(count: int, options: LaplacianOptions, modes: int = 0) -> None:
@@ -113,8 +113,7 @@ def check_room(count: int, each: int, advice: str = "Use fewer points, or free m
     >>> mf.check_room(len(points), each=200)
     """
     free = available_memory()
-    most = None if free is None else int(_SHARE * free / each)
-    if free is not None and most is not None and count > most:
+    if free is not None and count > (most := _fitting(free, each)):
         raise NotEnoughMemoryError(
             f"{count:,} points would take about {count * each / 2**30:.1f} GB of memory, and {free / 2**30:.1f} GB are"
             f" free: enough for {_rounded(most):,} points. {advice}",
@@ -139,7 +138,7 @@ def check_mode_memory(count: int, modes: int) -> None:
     free = available_memory()
     if free is None:
         return
-    most = int(_SHARE * free / (_PER_MODE * count))
+    most = _fitting(free, _PER_MODE * count)
     if modes > most:
         needed = _PER_MODE * count * modes
         raise NotEnoughMemoryError(
@@ -148,6 +147,11 @@ def check_mode_memory(count: int, modes: int) -> None:
             " use fewer points, or free memory.",
             fitting=most,
         )
+
+
+def _fitting(free: int, each: int) -> int:
+    """Return how many fit the free memory, of so many bytes each."""
+    return int(_SHARE * free / each)
 
 
 def _rounded(count: int) -> int:
