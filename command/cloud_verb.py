@@ -40,7 +40,7 @@ class CloudVerb(Verb):
 
     def run(self, path, arguments, output):
         given = self.read(path, arguments, arguments.columns)
-        core.check_room(clouds.count(given), self.bytes_a_point)
+        core.check_room(len(clouds.positions(given)), self.bytes_a_point)
         with ToldStages(self.name) as stages:
             figures, notices = self.work(path, given, arguments, output, stages)
         return {**figures, "seconds": stages.rounded, "notices": [*given.notices, *notices]}

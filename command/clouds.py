@@ -41,9 +41,9 @@ def read_file(path, columns="", las=None):
     return core.splats.read_file(path, lambda path: core.files.read_points(path, las=choices))
 
 
-def count(given) -> int:
-    """Return how many points or splats a file holds."""
-    return len(given) if isinstance(given, core.Splats) else len(given.points)
+def positions(given):
+    """Return the positions of the points or splats that a file holds, (n, 3)."""
+    return given.positions if isinstance(given, core.Splats) else given.points
 
 
 class Cloud:
@@ -67,7 +67,7 @@ class Cloud:
     def __init__(self, path, given, floaters=True):
         self.path, self.given, self.notices = path, given, list(given.notices)
         self.splats = given if isinstance(given, core.Splats) else None
-        places = np.asarray(given.points if self.splats is None else given.positions, dtype=np.float64)
+        places = np.asarray(positions(given), dtype=np.float64)
         self.place = core.files.choose_origin(places, degrees=getattr(given, "degrees", False))
         self.points = core.check_points(places - self.place)
         self.out = core.splats.floating_rows(given) if floaters and self.splats is not None else np.arange(0)
