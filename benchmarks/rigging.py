@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 import core
-from core.applications.graph import near_graph
+from core.operator.graph import near_graph
 
 from .deformation import BLENDER, run_in_blender
 from .real_shapes import noisy_points, random_points, shapes, with_outliers

@@ -134,9 +134,7 @@ def _home(core, path):
 
 def _package(core, home):
     """Return the public package in which something is defined, core where there is none."""
-    parts = home.split(".")[1:]
-    depth = 2 if parts[0] == "applications" else 1
-    package = core[parts[:depth]]
+    package = core[home.split(".")[1]]
     return package.path if package.is_init_module and package.name not in INNER else NAME
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..applications import DETAIL, roughness
 from ..arguments import not_negative
+from ..clean import DETAIL, roughness
 from ..geometry import Cloud
 from ..operator import LaplaceBeltrami
 from ..types import Floats

@@ -85,7 +85,7 @@ def known_results(installed):
 def known_operators(installed):
     """Build the narrow operators, by which tools solve on a cloud, only once for each operator that is kept."""
     known = WeakKeyDictionary()
-    deformation = part("core.applications.deforming.deformation")
+    deformation = part("core.deform.deformation")
     narrow_laplacian = deformation.narrow_laplacian
 
     def narrow(laplacian, *settings, progress=None):

@@ -57,8 +57,8 @@ COSTLY = {  # where each is called from
     "core.algebra.solvers": ("conjugate_gradients",),
     "core.operator.spectrum": ("coarse_to_fine", "lift_lowest"),
     "core.algebra.eigenvalue": ("eigsh",),
-    "core.applications.distance.geodesics": ("dijkstra",),
-    "core.applications.cleaning.smoothing": ("match_size",),
+    "core.distance.geodesics": ("dijkstra",),
+    "core.clean.smoothing": ("match_size",),
 }
 
 
@@ -131,7 +131,7 @@ def test_what_changes_results_is_computed(cache, calls):
 def test_lengths_are_made_once_for_all_that_is_measured_along_the_surface(cache, monkeypatch):
     add_ready(wave())
     bpy.ops.meshfree.geodesic_distance()
-    module = part("core.applications.distance.geodesics")
+    module = part("core.distance.geodesics")
     monkeypatch.setattr(module, "_lengths_of_pairs", lambda *_: pytest.fail("made again"))
     assert bpy.ops.meshfree.nearest_source() == {"FINISHED"}
     assert bpy.ops.meshfree.unwrap() == {"FINISHED"}

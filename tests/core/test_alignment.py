@@ -6,7 +6,7 @@ import pytest
 import core
 from benchmarks.alignment import aligned, case, errors, turned
 from benchmarks.samplings import fibonacci_sphere, random_sphere, square_random
-from core.applications import alignment
+from core.measure import alignment
 
 SPACING = 0.08  # of 1,500 points
 

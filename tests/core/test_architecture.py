@@ -1,4 +1,4 @@
-"""The arrows of the house: ui -> operators -> command -> core, the wings of core among themselves, no bpy in core."""
+"""The arrows of the house: ui -> operators -> command -> core, those between packages of core, no bpy in core."""
 
 import ast
 import functools
@@ -81,7 +81,7 @@ def test_no_imports_go_in_a_circle_not_even_for_types():
     TopologicalSorter(arrows).prepare()  # raises CycleError, which names the modules
 
 
-OPERATORS = {  # what each wing may import, beside itself and core
+OPERATORS = {  # what each package may import, beside itself and core
     "objects": (),
     "running": ("objects.",),
     "tools": ("objects.", "running."),
@@ -91,15 +91,15 @@ OPERATORS = {  # what each wing may import, beside itself and core
 }
 
 
-def test_operators_have_these_wings():
+def test_operators_have_these_packages():
     assert {file.parent.name for file in (ROOT / "operators").glob("*/*.py")} == OPERATORS.keys()
 
 
-@pytest.mark.parametrize("wing", OPERATORS)
-def test_wings_of_operators_point_one_way(wing):
-    files = sorted((ROOT / "operators" / wing).glob("*.py"))
+@pytest.mark.parametrize("package", OPERATORS)
+def test_packages_of_operators_point_one_way(package):
+    files = sorted((ROOT / "operators" / package).glob("*.py"))
     found = {(file.name, name) for file in files for name in imported(file) if name.startswith("..")}
-    allowed = ("command", "core", "registration", *OPERATORS[wing])
+    allowed = ("command", "core", "registration", *OPERATORS[package])
     assert {(file, name) for file, name in found if not name.lstrip(".").startswith(allowed)} == set()
 
 
@@ -124,11 +124,14 @@ def test_light_parts_of_core_import_no_scipy():
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
 
 
-def test_what_is_taken_from_core_is_public_or_in_the_face_of_a_package():
+def test_what_is_taken_from_core_is_public_or_listed_by_a_package():
     names = {name[1:] for path in BLENDER_SIDE for name in taken(path)}
     assert len(names) > 40
-    faces = {wing: {name.split(".")[-1] for name in imported(ROOT / "core" / wing / "__init__.py")} for wing in BELOW}
-    assert names <= {*core.__all__, *(f"{wing}.{name}" for wing, face in faces.items() for name in face)}
+    lists = {
+        package: {name.split(".")[-1] for name in imported(ROOT / "core" / package / "__init__.py")}
+        for package in BELOW
+    }
+    assert names <= {*core.__all__, *(f"{package}.{name}" for package, names in lists.items() for name in names)}
 
 
 @pytest.mark.parametrize("call", [r"\blayout\b", r"\bdef draw", r"\bbpy\.ops\.meshfree\."])
@@ -150,50 +153,42 @@ GROUND = {
     "progress",
     "types",
 }
-BELOW = {  # what each wing of core may use
+TOPICS = {  # what the operator is for, and the other topics that each truly builds on
+    "clean": (),
+    "deform": (),
+    "distance": (),
+    "measure": ("deform", "distance", "surface"),
+    "motion": (),
+    "rig": ("motion",),
+    "spectral": (),
+    "surface": (),
+}
+BELOW = {  # what each package of core may use
     "algebra": {"cores", "errors", "types"},
     "geometry": GROUND | {"algebra"},
     "operator": GROUND | {"algebra", "geometry"},
-    "applications": GROUND | {"algebra", "geometry", "operator"},
     "paper": GROUND | {"algebra", "geometry", "operator"},
-    "tiles": GROUND | {"applications", "files", "geometry", "operator"},
+    "tiles": GROUND | {"clean", "files", "geometry", "operator"},
     "files": GROUND,
     "splats": GROUND | {"algebra", "files"},
-}
-SIDEWAYS = {  # packages and modules of applications that build on others
-    ("deforming", "graph"),
-    ("fields", "graph"),
-    ("measuring", "deforming"),
-    ("measuring", "distance"),
-    ("measuring", "graph"),
-    ("measuring", "surfaces"),
-    ("rigging", "graph"),
-    ("rigging", "motion"),
-    ("spectral", "graph"),
-}
+} | {topic: GROUND | {"algebra", "geometry", "operator", *others} for topic, others in TOPICS.items()}
 
 
-def modules_of(wing):
-    return sorted(path for path in (ROOT / "core" / wing).rglob("*.py") if path.name != "__init__.py")
+def modules_of(package):
+    return sorted(path for path in (ROOT / "core" / package).rglob("*.py") if path.name != "__init__.py")
 
 
-def depth(path):
-    """Return how many dots lead from a module of core to core."""
-    return len(path.relative_to(ROOT / "core").parts)
-
-
-@pytest.mark.parametrize("wing", BELOW)
-def test_wings_of_core_use_what_is_below_them_by_its_face(wing):
+@pytest.mark.parametrize("package", BELOW)
+def test_packages_of_core_use_what_is_below_them_by_its_list(package):
     """``..geometry`` gives what `core/geometry/__init__.py` lists; its modules are its own."""
-    assert len(modules_of(wing)) > 2
+    assert len(modules_of(package)) > 2
     wrong = []
-    for path in modules_of(wing):
-        up = "." * depth(path)
-        names = [name.removeprefix(up) for name in imported(path) if name.startswith(up)]
+    for path in modules_of(package):
+        names = [name.removeprefix("..") for name in imported(path) if name.startswith("..")]
         wrong += [
             f"{path.name}: {name}"
             for name in names
-            if name.split(".")[0] not in BELOW[wing] or (name.split(".")[0] in BELOW and name.count(".") != 1)
+            if name.split(".")[0] not in BELOW[package] or (name.split(".")[0] in BELOW and name.count(".") != 1)
         ]
     assert wrong == []
 
@@ -203,24 +198,25 @@ def test_the_ground_uses_nothing_above():
     assert {name.split(".")[1] for name in names} <= GROUND
 
 
-def test_applications_use_each_other_only_where_they_build_on_them():
-    found = set()
-    for path in modules_of("applications"):
-        up = "." * (depth(path) - 1)
-        own = path.relative_to(ROOT / "core" / "applications").parts[0].removesuffix(".py")
-        beside = [name.removeprefix(up) for name in imported(path) if re.match(rf"{re.escape(up)}\w", name)]
-        found |= {(own, name.split(".")[0]) for name in beside}
-    assert {pair for pair in found if pair[0] != pair[1]} == SIDEWAYS
+def test_topics_build_on_no_more_of_each_other_than_is_told():
+    found = {
+        (topic, name.split(".")[2])
+        for topic in TOPICS
+        for path in modules_of(topic)
+        for name in imported(path)
+        if name.startswith("..") and name.split(".")[2] in TOPICS
+    }
+    assert found == {(topic, other) for topic, others in TOPICS.items() for other in others}
 
 
-def test_a_wing_lists_only_what_others_use():
-    """The names in a wing's face are those that another wing, the public calls, or Blender's side take from it."""
-    for wing in ("algebra", "geometry", "operator"):
-        listed = {name.rpartition(".")[2] for name in imported(ROOT / "core" / wing / "__init__.py")}
+def test_a_package_lists_only_what_others_use():
+    """The names are those that another package, the public calls, or Blender's side take from it."""
+    for package in ("algebra", "geometry", "operator"):
+        listed = {name.rpartition(".")[2] for name in imported(ROOT / "core" / package / "__init__.py")}
         above = [path for other in BELOW for path in modules_of(other)]
-        used = {name.rpartition(".")[2] for path in above for name in imported(path) if f".{wing}." in name}
-        outside = {name.removeprefix(f".{wing}.") for path in BLENDER_SIDE for name in taken(path)}
-        assert listed == used | {name for name in core.__all__ if core._HOMES[name] == wing} | (outside & listed)
+        used = {name.rpartition(".")[2] for path in above for name in imported(path) if f".{package}." in name}
+        outside = {name.removeprefix(f".{package}.") for path in BLENDER_SIDE for name in taken(path)}
+        assert listed == used | {name for name in core.__all__ if core._HOMES[name] == package} | (outside & listed)
 
 
 @pytest.mark.parametrize("package", ["files", "paper", "splats", "tiles"])

@@ -17,7 +17,7 @@ from numpy.testing import assert_allclose
 
 import core
 from benchmarks.samplings import fibonacci_sphere, square_grid
-from core.applications.cleaning.sizes import match_size
+from core.clean.sizes import match_size
 
 TIMES = int(os.environ.get("MESHFREE_CASES", "1"))
 pytestmark = pytest.mark.filterwarnings("error")

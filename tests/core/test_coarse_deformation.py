@@ -7,7 +7,7 @@ import pytest
 
 import core
 from benchmarks.samplings import bar, bent_end, fibonacci_sphere, random_sphere, strip_points
-from core.applications.deforming.coarse_deformation import _linear_weights
+from core.deform.coarse_deformation import _linear_weights
 from core.geometry.thinning import thin
 
 COUNT = 1000

@@ -13,10 +13,10 @@ import core
 from benchmarks.awkward import box
 from benchmarks.samplings import fibonacci_sphere, random_sphere, square_random
 from core import cores
-from core.applications.surfaces import meshing
-from core.applications.surfaces.grid import grid_around
-from core.applications.surfaces.quads import all_quads
-from core.applications.surfaces.sides import agreeing
+from core.surface import meshing
+from core.surface.grid import grid_around
+from core.surface.quads import all_quads
+from core.surface.sides import agreeing
 
 
 def edges_of(mesh):

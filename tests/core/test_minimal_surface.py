@@ -8,7 +8,7 @@ import pytest
 import core
 from benchmarks.plateau import cap, catenoid, catenoid_errors, helicoid, tube
 from benchmarks.samplings import fibonacci_sphere, grid_points, hemisphere_random, random_sphere, square_grid
-from core.applications.deforming.boundary_curve import BoundaryCurve
+from core.deform.boundary_curve import BoundaryCurve
 
 
 @pytest.fixture(scope="module")
@@ -331,7 +331,7 @@ def test_given_distances_hold_beside_corners_only():
 
 
 def test_a_step_that_was_not_found_settles_nothing(monkeypatch):
-    monkeypatch.setattr(sys.modules["core.applications.deforming.minimal_surface"], "_PRODUCTS", 1)
+    monkeypatch.setattr(sys.modules["core.deform.minimal_surface"], "_PRODUCTS", 1)
     grid = square_grid(12)
     edge = np.isin(grid[:, :2], [grid.min(), grid[:, :2].max()]).any(axis=1)
     bump = grid + 0.01 * np.where(edge, 0.0, np.sin(3.0 * grid[:, 0]))[:, None] * [0.0, 0.0, 1.0]

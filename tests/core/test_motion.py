@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 import core
 from benchmarks.samplings import open_cylinder, random_sphere, strip_points, torus_eigenvalues
-from core.applications.motion import propagation
+from core.motion import propagation
 
 RNG = np.random.default_rng(5)
 

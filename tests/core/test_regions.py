@@ -3,7 +3,7 @@ import pytest
 
 import core
 from benchmarks.samplings import random_sphere
-from core.applications.measuring.regions import _edge, _find_line, _Line, _second, _slope, _step
+from core.measure.regions import _edge, _find_line, _Line, _second, _slope, _step
 
 
 def cap(points, degrees, axis=(0.3, -0.5, 0.8)):

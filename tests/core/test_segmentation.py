@@ -19,8 +19,8 @@ from benchmarks.samplings import (
     square_random,
     trimmed_star,
 )
-from core.applications.graph import near_graph
-from core.applications.spectral.segmentation import _signature
+from core.operator.graph import near_graph
+from core.spectral.segmentation import _signature
 
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 

@@ -6,7 +6,7 @@ from scipy.special import sph_harm_y
 
 import core
 from benchmarks.samplings import disc_random, fibonacci_sphere, hemisphere_random, open_cylinder, square_grid
-from core.applications.cleaning.smoothing import boundary_places
+from core.clean.smoothing import boundary_places
 
 BUMP = 0.1
 

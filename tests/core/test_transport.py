@@ -9,7 +9,7 @@ from scipy.sparse.linalg import splu
 import core
 from benchmarks.samplings import open_cylinder, random_sphere, square_grid, square_random
 from core.algebra import TwoGrid
-from core.applications.distance.geodesics import Geodesics
+from core.distance.geodesics import Geodesics
 from core.operator import connection_laplacian, tangent_frames
 
 

@@ -1,1 +1,0 @@
-"""Fewer, smoother and better points."""

@@ -1,1 +1,0 @@
-"""Surfaces that bend by handles, and that shrink to the least area."""

@@ -1,1 +1,0 @@
-"""Distances, paths and directions along a surface."""

@@ -1,1 +1,0 @@
-"""Areas, lengths, volumes, sections and slopes of a surface."""

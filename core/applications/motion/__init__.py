@@ -1,1 +1,0 @@
-"""Heat, waves, reactions and fronts that travel along a surface."""

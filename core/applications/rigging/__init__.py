@@ -1,1 +1,0 @@
-"""Weights of bones, their transfer, and surfaces that follow bones."""

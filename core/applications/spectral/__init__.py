@@ -1,1 +1,0 @@
-"""What the modes of a surface are for: descriptors, matching, segments."""
