@@ -147,7 +147,7 @@ def measure(vertices, faces, seeds, report=lambda text: None, share=1.0):
     for seed in seeds:
         made = case(vertices, faces, seed)
         began = time.process_time()
-        found = core.align(made.points, made.target, overlap=share)
+        found = core.measure.align(made.points, made.target, overlap=share)
         seconds = time.process_time() - began
         theirs = errors(align_with_open3d(peer, made), made) if peer else (np.nan, np.nan)
         rows.append([*errors(found.matrix, made), found.converged, seconds, *theirs])

@@ -54,7 +54,7 @@ def moves(laplacian):
         ("linear, soft", {"rotation_aware": False, "weights": 1.0}),
         ("rotation-aware, soft", {"weights": 1.0}),
     ):
-        deformer = core.Deformer(laplacian, both, **settings)
+        deformer = core.deform.Deformer(laplacian, both, **settings)
 
         def measure(deformer=deformer):
             maps = [lambda x: x, lambda x: x + (1.0, -2.0, 3.0)]
@@ -78,7 +78,7 @@ def bend(laplacian, quads, section):
 
     for neighbors in (30, 45, None):
         chosen = {} if neighbors is None else {"neighbors": neighbors}
-        deformer = core.Deformer(laplacian, last, first, **chosen)
+        deformer = core.deform.Deformer(laplacian, last, first, **chosen)
 
         def measure(deformer=deformer):
             result, steps, _ = deformer.deform(target)
@@ -98,7 +98,7 @@ def bend(laplacian, quads, section):
             percent("RMS difference to Blender, 30 iterations", 3.0),
         ]
         yield from judge(f"bar bent by 90 degrees, {neighbors or 'default'} neighbors", goals, measure())
-    straight = core.Deformer(laplacian, last, first, rotation_aware=False).solve(target)
+    straight = core.deform.Deformer(laplacian, last, first, rotation_aware=False).solve(target)
     goals = [percent("cross-section area, worst")]
     areas = section_areas(straight, section)
     yield from judge("bar bent by 90 degrees, linear", goals, iter([np.abs(areas - 1.0).max()]))
@@ -137,14 +137,14 @@ def cost():
         times, runs = (3, 25) if count < 50_000 else (1, 5)
 
         def measure(sets=sets, chosen=chosen, times=times, runs=runs):
-            for kind in (core.coarse_deformer, core.Deformer):
+            for kind in (core.deform.coarse_deformer, core.deform.Deformer):
                 gaps, seconds = zip(*(reported(kind, *sets, **chosen) for _ in range(times)), strict=True)
                 yield min(seconds)
                 yield min(gaps)
-            linear = core.Deformer(*sets, rotation_aware=False, **chosen)
+            linear = core.deform.Deformer(*sets, rotation_aware=False, **chosen)
             target = linear.points[linear.handles] + (0.0, 0.0, 0.5)
             yield least(runs, lambda: linear.solve(target))
-            aware, coarse = core.Deformer(*sets, **chosen), core.coarse_deformer(*sets, **chosen)
+            aware, coarse = core.deform.Deformer(*sets, **chosen), core.deform.coarse_deformer(*sets, **chosen)
             result = aware.solve(target)
             yield least(runs, lambda: aware.solve(target, steps=1))
             yield least(runs, lambda: aware.solve(target, steps=1, start=result))
@@ -222,7 +222,7 @@ def scans():
             continue
         points = read_ply(path).astype(np.float64)
         handles, anchors, move = choose(points)
-        deformer = core.Deformer(core.build_laplacian(points), handles, anchors)
+        deformer = core.deform.Deformer(core.build_laplacian(points), handles, anchors)
 
         def measure(deformer=deformer, move=move):
             result, steps, _ = deformer.deform(deformer.points[deformer.handles] + move)

@@ -39,7 +39,7 @@ def poisson():
             laplacian = core.build_laplacian(points, options=options)
             exact = torus_potential(points)
             exact -= laplacian.areas @ exact / laplacian.areas.sum()
-            found = core.solve_poisson(laplacian, -points[:, 0] / np.hypot(points[:, 0], points[:, 1]))
+            found = core.distance.solve_poisson(laplacian, -points[:, 0] / np.hypot(points[:, 0], points[:, 1]))
             errors.append(relative(found, exact))
             yield errors[-1]
             if len(errors) > 1:
@@ -64,9 +64,9 @@ def harmonic():
         x = points[:, 0]
         fixed = (x <= 0.25 + 1e-12) | (x >= 2.75 - 1e-12)
         exact = np.clip((x - 0.25) / 2.5, 0.0, 1.0)
-        found = core.harmonic_field(laplacian, fixed, exact[fixed])
+        found = core.distance.harmonic_field(laplacian, fixed, exact[fixed])
         yield np.abs(found - exact).max()
-        plain = core.solve_poisson(laplacian, 0.0, fixed, exact[fixed])  # not clipped to the range
+        plain = core.distance.solve_poisson(laplacian, 0.0, fixed, exact[fixed])  # not clipped to the range
         yield max(-plain.min(), plain.max() - 1.0, 0.0)
 
     clouds = {"91 x 31 grid": strip_points()} | {
@@ -86,7 +86,7 @@ def geodesic():
         def error(found):
             return np.abs(found - exact).mean() / exact.mean()
 
-        yield error(core.geodesic_distance(laplacian, sources))
+        yield error(core.distance.geodesic_distance(laplacian, sources))
         if potpourri3d is None:
             yield "not installed"
         else:
@@ -133,7 +133,7 @@ def along():
         near = points @ points[source] > -0.9
         laplacian = core.build_laplacian(points)
         began = time.process_time()
-        carried = core.Transport(laplacian)
+        carried = core.distance.Transport(laplacian)
         found, place = carried.extend([source], direction), carried.logarithmic_map(source, direction)
         seconds = time.process_time() - began
         yield from errors(found, place, exact(points, laplacian.normals[source], source, direction), near)
@@ -180,12 +180,12 @@ def along_cost():
 
     def own(laplacian, others, curve):
         points = laplacian.points
-        seconds, carried = spend(core.Transport, laplacian)
+        seconds, carried = spend(core.distance.Transport, laplacian)
         yield seconds
         yield spend(carried.extend, [7], [0.3, -0.5, 0.8])[0]
         yield spend(carried.logarithmic_map, 7)[0]
         yield spend(carried.logarithmic_map, len(points) // 2)[0]
-        seconds, geodesics = spend(core.Geodesics, laplacian)
+        seconds, geodesics = spend(core.distance.Geodesics, laplacian)
         yield seconds
         yield spend(geodesics.distance, [7])[0]
         yield spend(geodesics.nearest_source, others)[0]
@@ -235,17 +235,17 @@ def cost():
 
     def measure():
         began = time.perf_counter()
-        distance = core.geodesic_distance(laplacian, [0])
+        distance = core.distance.geodesic_distance(laplacian, [0])
         yield time.perf_counter() - began
         far = distance.max()
         bands = (distance < 0.1 * far) | (distance > 0.9 * far)
         for fixed in (bands, [0, int(np.argmax(distance))]):
             began = time.perf_counter()
-            core.harmonic_field(laplacian, fixed, np.round(distance / far)[fixed])
+            core.distance.harmonic_field(laplacian, fixed, np.round(distance / far)[fixed])
             yield time.perf_counter() - began
         source = distance - laplacian.areas @ distance / laplacian.areas.sum()
         began = time.perf_counter()
-        core.solve_poisson(laplacian, source)
+        core.distance.solve_poisson(laplacian, source)
         yield time.perf_counter() - began
 
     figures = ("distance", "harmonic, bands", "harmonic, two points", "Poisson")

@@ -76,7 +76,7 @@ def main(folder):
             f"{RANDOM:,} at random": sample(vertices, faces, RANDOM, rng),
         }
         for kind, points in clouds.items():
-            discs = core.surface_discs(points)
+            discs = core.surface.surface_discs(points)
             radii = SIZE * discs.radii
             even = np.full(len(radii), radii.mean())
             shares = [holes(points, discs.normals, size, dense, rng) for size in (radii, even)]

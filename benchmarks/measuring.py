@@ -93,7 +93,7 @@ def regions():
             points = make(COUNT, seed)
             laplacian = core.build_laplacian(points)
             for name, members, area, length in parts(points, seed):
-                region = core.measure_region(laplacian, members)
+                region = core.measure.measure_region(laplacian, members)
                 plain, doubt = laplacian.areas[members].sum() / area - 1.0, region.area_uncertainty / area
                 errors = plain, region.area / area - 1.0, region.boundary_length / length - 1.0
                 found.setdefault(name, []).append((*errors, doubt, region.length_uncertainty / length))
@@ -126,7 +126,7 @@ def paths():
             if cloud != "cylinder":
                 pairs += [(i, int((points @ points[i]).argmin())) for i in rng.integers(0, COUNT, 4)]
             for start, end in pairs:
-                length = core.polygon_length(core.geodesic_path(laplacian, start, end))
+                length = core.distance.polygon_length(core.distance.geodesic_path(laplacian, start, end))
                 errors.append(length / exact(points[start], points[end]) - 1.0)
         yield row(cloud, "path", errors, ())
     errors = []
@@ -135,7 +135,7 @@ def paths():
         ends = 0.6 * np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
         laplacian = core.build_laplacian(np.concatenate([ends, torus_points(COUNT, seed=seed)]))
         for end in range(1, 6):
-            length = core.polygon_length(core.geodesic_path(laplacian, 0, end))
+            length = core.distance.polygon_length(core.distance.geodesic_path(laplacian, 0, end))
             errors.append(length / (0.6 * angle[end]) - 1.0)
     yield row("torus, inner equator", "path", errors, ())
 
@@ -156,7 +156,7 @@ def areas():
     """Areas of all shapes, which are 1: with all their components."""
     for sampling in ("vertices", "random 3,000", "noise 0.1", "noise 0.3"):
         for name, (vertices, faces, _) in shapes().items():
-            found = core.measure_parts(core.build_laplacian(SAMPLINGS[sampling](vertices, faces)))
+            found = core.measure.measure_parts(core.build_laplacian(SAMPLINGS[sampling](vertices, faces)))
             yield row(f"{name}, {sampling}", "area", [found.areas.sum() - 1.0], [found.area_uncertainties.sum()])
 
 
@@ -164,7 +164,7 @@ def volumes():
     """Volumes of closed shapes."""
     for sampling in ("random 10,000", "noise 0.3"):
         for name, vertices, faces in closed_shapes():
-            found = core.enclosed_volume(core.build_laplacian(SAMPLINGS[sampling](vertices, faces)))
+            found = core.measure.enclosed_volume(core.build_laplacian(SAMPLINGS[sampling](vertices, faces)))
             exact = volume_of(vertices, faces)
             yield row(f"{name}, {sampling}", "volume", [found.volume / exact - 1.0], [found.uncertainty / exact])
 
@@ -176,7 +176,9 @@ def holes():
         exact, errors, doubts = volume_of(vertices, faces), [], []
         for seed, radius in enumerate((0.03, 0.06, 0.1)):
             middle = points[np.random.default_rng(seed).integers(COUNT)]
-            found = core.enclosed_volume(core.build_laplacian(points[np.linalg.norm(points - middle, axis=1) > radius]))
+            found = core.measure.enclosed_volume(
+                core.build_laplacian(points[np.linalg.norm(points - middle, axis=1) > radius])
+            )
             errors.append(found.volume / exact - 1.0)
             doubts.append(found.uncertainty / exact)
         yield row(f"{name}, with a hole", "volume", errors, doubts)

@@ -100,7 +100,7 @@ def _to_triangle(points, corners):
 
 def ours(laplacian):
     """Return a mesh of the points of an operator as vertices and quads."""
-    mesh = core.mesh_surface(laplacian)
+    mesh = core.surface.mesh_surface(laplacian)
     return mesh.vertices, mesh.faces
 
 

@@ -68,7 +68,7 @@ def figure_14():
 
     def measure(start, **settings):
         began = time.perf_counter()
-        film = core.minimal_surface(start, fixed, **settings)
+        film = core.deform.minimal_surface(start, fixed, **settings)
         seconds = time.perf_counter() - began
         yield from catenoid_errors(film.points, film.areas)
         yield film.steps
@@ -94,7 +94,7 @@ def caps():
 
         def measure(count=count):
             points, fixed = cap(hemisphere_random(count), round(np.sqrt(2.0 * np.pi * count)))
-            film = core.minimal_surface(points, fixed)
+            film = core.deform.minimal_surface(points, fixed)
             yield np.abs(film.points[:, 2]).max()
             yield film.areas.sum() / np.pi - 1.0
             yield film.steps
@@ -105,7 +105,7 @@ def caps():
 def corners():
     """A boundary with four corners."""
     points, boundary, area = helicoid()
-    film = core.minimal_surface(points, boundary)
+    film = core.deform.minimal_surface(points, boundary)
     off = np.abs(film.points[:, 0] * np.sin(film.points[:, 2]) - film.points[:, 1] * np.cos(film.points[:, 2])).max()
     values = iter([film.areas.sum() / area - 1.0, off])
     yield from judge("helicoid, 61 x 49", [percent("area"), Goal("distance, max")], values)
@@ -115,7 +115,7 @@ def necks():
     """Two rings ever further apart: a catenoid exists up to 1.325 radii."""
     for height in (2.6, 2.7, 3.2, 5.0):
         points, fixed = tube(98, round(10.0 * height), height=height)
-        film = core.minimal_surface(points, fixed)
+        film = core.deform.minimal_surface(points, fixed)
         case = f"rings {height / 2.0:g} radii apart, 98 x {round(10.0 * height)}"
         ended = film.reason if np.isfinite(film.points).all() else "not finite"
         wanted = "converged" if height < 2.65 else "pinching"

@@ -31,26 +31,26 @@ def results(points):
     yield "component", laplacian.component
     yield "stiffness", laplacian.stiffness @ functions
     yield "apply", laplacian.apply(functions)
-    yield "mean curvature", core.mean_curvature(laplacian)
+    yield "mean curvature", core.measure.mean_curvature(laplacian)
     yield "gaussian curvature", laplacian.gaussian_curvature
     yield "eigenvalues", laplacian.corrected(spectrum).eigenvalues
     yield "notices", np.array(laplacian.notices)
     yield "estimated areas", core.estimate_areas(points)
     yield "estimated normals", core.estimate_normals(points)
-    yield "geodesic", core.geodesic_distance(laplacian, [low])
-    yield "harmonic", core.harmonic_field(laplacian, [low, high], [0.0, 1.0])
-    yield "Poisson", core.solve_poisson(laplacian, functions[:, 0], [high], [0.0])
-    yield "filter", core.spectral_filter(functions, spectrum, laplacian.areas, 10)
-    yield "smooth", core.smooth_points(laplacian, 12, spectrum)
-    yield "fair", core.fair_points(laplacian, keep="area")
-    yield "mode shape", core.displace_by_mode(laplacian, points[:, 0])
-    yield "heat signature", core.heat_kernel_signature(spectrum, count=5)
-    yield "wave signature", core.wave_kernel_signature(spectrum, count=5)
-    yield "domains", core.nodal_domains(points[:, 0] - points[:, 0].mean(), laplacian)
-    yield "segments", core.segment(laplacian, laplacian.component.max() + 4)
-    yield "grown", core.grow(laplacian, [low], 0.1 * size)
+    yield "geodesic", core.distance.geodesic_distance(laplacian, [low])
+    yield "harmonic", core.distance.harmonic_field(laplacian, [low, high], [0.0, 1.0])
+    yield "Poisson", core.distance.solve_poisson(laplacian, functions[:, 0], [high], [0.0])
+    yield "filter", core.clean.spectral_filter(functions, spectrum, laplacian.areas, 10)
+    yield "smooth", core.clean.smooth_points(laplacian, 12, spectrum)
+    yield "fair", core.clean.fair_points(laplacian, keep="area")
+    yield "mode shape", core.clean.displace_by_mode(laplacian, points[:, 0])
+    yield "heat signature", core.spectral.heat_kernel_signature(spectrum, count=5)
+    yield "wave signature", core.spectral.wave_kernel_signature(spectrum, count=5)
+    yield "domains", core.spectral.nodal_domains(laplacian, points[:, 0] - points[:, 0].mean())
+    yield "segments", core.spectral.segment(laplacian, laplacian.component.max() + 4)
+    yield "grown", core.distance.grow(laplacian, [low], 0.1 * size)
     order = np.argsort(points[:, 2])
-    deformer = core.Deformer(laplacian, order[-len(points) // 50 :], order[: len(points) // 20])
+    deformer = core.deform.Deformer(laplacian, order[-len(points) // 50 :], order[: len(points) // 20])
     yield "deformed", deformer.solve(points[deformer.handles] + [0.1 * size, 0.0, 0.0])
     if len(points) <= _PAPER:
         paper = core.paper.build_laplacian(points)
@@ -62,7 +62,7 @@ def minimal():
     """The paper's catenoid, from a cylinder."""
     angle, height = np.meshgrid(np.arange(60) * (2.0 * np.pi / 60), np.linspace(-1.0, 1.0, 21))
     points = np.column_stack([2.0 * np.cos(angle.ravel()), 2.0 * np.sin(angle.ravel()), height.ravel()])
-    return core.minimal_surface(points, np.abs(points[:, 2]) == 1.0).points
+    return core.deform.minimal_surface(points, np.abs(points[:, 2]) == 1.0).points
 
 
 def save(target, *paths):

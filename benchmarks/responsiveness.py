@@ -65,23 +65,26 @@ def works(points):
     def analysis(progress):
         laplacian = core.build_laplacian(points, progress=progress)
         progress("Curvature", 1.0)
-        core.mean_curvature(laplacian)
+        core.measure.mean_curvature(laplacian)
         kept.append(laplacian)
 
     x = points[:, 0]
     ends = (x > np.quantile(x, 0.98)) | (x < np.quantile(x, 0.02))
     yield "analysis", analysis
     yield "50 modes", lambda progress: kept[0].eigenpairs(50, progress=progress)
-    yield "remove noise", lambda progress: core.fair_points(kept[0], progress=progress)
+    yield "remove noise", lambda progress: core.clean.fair_points(kept[0], progress=progress)
     yield (
         "bind",
-        lambda progress: core.Deformer(
+        lambda progress: core.deform.Deformer(
             kept[0], np.flatnonzero(ends & (x > 0.0)), np.flatnonzero(ends & (x < 0.0)), progress=progress
         ),
     )
-    yield "harmonic field", lambda progress: core.harmonic_field(kept[0], ends, np.sign(x[ends]), progress=progress)
-    yield "geodesic distance", lambda progress: core.geodesic_distance(kept[0], ends, progress=progress)
-    yield "6 parts", lambda progress: core.segment(kept[0], 6, progress=progress)
+    yield (
+        "harmonic field",
+        lambda progress: core.distance.harmonic_field(kept[0], ends, np.sign(x[ends]), progress=progress),
+    )
+    yield "geodesic distance", lambda progress: core.distance.geodesic_distance(kept[0], ends, progress=progress)
+    yield "6 parts", lambda progress: core.spectral.segment(kept[0], 6, progress=progress)
 
 
 def responsiveness(sizes=SIZES):

@@ -72,14 +72,14 @@ def cat():
         laplacian = core.build_laplacian(sample(vertices, faces))
 
         def measure(name=name, laplacian=laplacian):
-            weights = core.bone_weights(laplacian, *ends)
+            weights = core.rig.bone_weights(laplacian, *ends)
             known[name] = laplacian, weights
             yield max(-weights.min(), 0.0)
             yield np.abs(weights.sum(axis=1) - 1.0).max()
             yield jump(laplacian, weights)
             kept = np.flatnonzero(laplacian.component >= 0)
             every = np.concatenate([laplacian.surface_points[kept], vertices])
-            carried = core.Prolongation(every, np.arange(len(kept)), laplacian.normals[kept])
+            carried = core.clean.Prolongation(every, np.arange(len(kept)), laplacian.normals[kept])
             yield np.abs(carried.interpolate(weights[kept])[len(kept) :] - known["vertices"][1]).mean()
 
         goals = [
@@ -125,7 +125,7 @@ def pressed():
                 hand = slab(sampling(1333), [0.5, 0.5, 0.15]) + [0.0, 0.0, height]
                 laplacian = core.build_laplacian(np.concatenate([hip, hand]))
                 heads, tails = [[-0.8, 0, 0], [-0.4, 0, height]], [[0.8, 0, 0], [0.4, 0, height]]
-                weights = core.bone_weights(laplacian, heads, tails)
+                weights = core.rig.bone_weights(laplacian, heads, tails)
                 wrong = np.concatenate([weights[: len(hip), 1], weights[len(hip) :, 0]])
                 away = np.concatenate([cKDTree(hand).query(hip)[0], cKDTree(hip).query(hand)[0]])
                 yield wrong[away > (gap + 2.0) * spacing].max()
@@ -158,9 +158,11 @@ def elbow():
         return abs(sum(np.einsum("ij,ij->", p, np.cross(q, r)) for p, q, r in sides)) / 6.0
 
     def measure():
-        weights = core.bone_weights(core.build_laplacian(points), [[-1.9, 0, 0], [0, 0, 0]], [[0, 0, 0], [1.9, 0, 0]])
+        weights = core.rig.bone_weights(
+            core.build_laplacian(points), [[-1.9, 0, 0], [0, 0, 0]], [[0, 0, 0], [1.9, 0, 0]]
+        )
         for dual in (True, False):
-            moved = core.skin(points, weights, pose, dual_quaternions=dual).reshape(rings.shape)
+            moved = core.rig.skin(points, weights, pose, dual_quaternions=dual).reshape(rings.shape)
             yield volume(moved) / volume(rings) - 1.0
 
     goals = [percent("volume, dual quaternions", 5.0), percent("volume, linear")]
@@ -177,12 +179,12 @@ def cost():
 
     def measure():
         began = time.process_time()
-        weights = core.bone_weights(
+        weights = core.rig.bone_weights(
             laplacian, joints[:-1].reshape(-1, 3), joints[1:].reshape(-1, 3), influences=4, least=0.01
         )
         yield time.process_time() - began
         began = time.process_time()
-        core.smooth_weights(laplacian, weights, 4.0 * np.sqrt(np.median(laplacian.areas)))
+        core.rig.smooth_weights(laplacian, weights, 4.0 * np.sqrt(np.median(laplacian.areas)))
         yield time.process_time() - began
 
     goals = [Goal("seconds of CPU time", 8.0, "{:.1f}"), Goal("smoothed, seconds of CPU time", None, "{:.1f}")]

@@ -103,17 +103,17 @@ def run_applications(count):
     watch, points = Watch(), random_sphere(count)
     built = core.build_laplacian(points)
     low, high = points[:, 2] < -0.95, points[:, 2] > 0.95
-    watch.run("smoothing", core.smooth_points, built, core.exponential(0.1))
+    watch.run("smoothing", core.clean.smooth_points, built, core.clean.exponential(0.1))
     fixed = np.flatnonzero(low | high)
-    watch.run("harmonic field", core.harmonic_field, built, fixed, high[fixed].astype(float))
-    geodesics = watch.run("geodesics, set-up", core.Geodesics, built)
+    watch.run("harmonic field", core.distance.harmonic_field, built, fixed, high[fixed].astype(float))
+    geodesics = watch.run("geodesics, set-up", core.distance.Geodesics, built)
     watch.run("geodesics, a source", geodesics.distance, [0])
-    watch.run("segmentation", core.segment, built, 6)
-    watch.run("binding by a coarse cloud", core.coarse_deformer, built, high, low)
-    watch.run("binding", core.Deformer, built, high, low)
+    watch.run("segmentation", core.spectral.segment, built, 6)
+    watch.run("binding by a coarse cloud", core.deform.coarse_deformer, built, high, low)
+    watch.run("binding", core.deform.Deformer, built, high, low)
     belt = np.abs(points[:, 2]) < 0.5
     ends = np.abs(points[belt, 2]) > 0.47
-    watch.run("minimal surface", core.minimal_surface, points[belt], ends)
+    watch.run("minimal surface", core.deform.minimal_surface, points[belt], ends)
     return watch, {}
 
 

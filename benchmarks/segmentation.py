@@ -26,7 +26,10 @@ def isometry():
         for mode in (2, 4, 10):
             flat = modes[:, mode - 1]
             sure = np.abs(flat) > 0.02 * np.abs(flat).max()
-            domains = [core.nodal_domains(flat, plane), core.nodal_domains(spectrum.eigenvectors[:, mode - 1], bent)]
+            domains = [
+                core.spectral.nodal_domains(plane, flat),
+                core.spectral.nodal_domains(bent, spectrum.eigenvectors[:, mode - 1]),
+            ]
             figures = [
                 ("labels that agree, above 2 %", agreement(*(label[sure] for label in domains)), 0.97),
                 ("labels that agree, all points", agreement(*domains), None),
@@ -42,7 +45,7 @@ def noise():
         points = trimmed_star(arms=arms, seed=seed)
         clean = core.build_laplacian(points)
         spectrum = clean.eigenpairs(8)
-        domains = core.nodal_domains(spectrum.eigenvectors[:, 5], clean)
+        domains = core.spectral.nodal_domains(clean, spectrum.eigenvectors[:, 5])
         spacing = np.sqrt(clean.areas.sum() / len(points))
         around = np.sqrt(np.mean(np.sum((points - points.mean(axis=0)) ** 2, axis=1)))
         diagonal = np.linalg.norm(np.ptp(points, axis=0))
@@ -54,7 +57,7 @@ def noise():
                     shift = 0.03 * size * np.random.default_rng(seed).standard_normal(points.shape)
                     rough = core.build_laplacian(points + shift)
                     mode = rough.eigenpairs(8).eigenvectors[:, 5]
-                    shares.append(agreement(domains, core.nodal_domains(mode, rough)))
+                    shares.append(agreement(domains, core.spectral.nodal_domains(rough, mode)))
                 yield np.mean(shares)
                 yield 0.03 * size / spacing
 
@@ -69,7 +72,7 @@ def sausages():
     def measure(bent):
         points, along = sausage(bent=bent)
         laplacian = core.build_laplacian(points)
-        domains = core.nodal_domains(laplacian.eigenpairs(2).eigenvectors[:, 1], laplacian)
+        domains = core.spectral.nodal_domains(laplacian, laplacian.eigenpairs(2).eigenvectors[:, 1])
         yield domains.max() + 1
         middle = 0.5 * (along.min() + along.max())
         yield agreement(domains, (along > middle).astype(int))
@@ -97,13 +100,13 @@ def scans():
     for path in paths:
         laplacian = core.build_laplacian(read_ply(path))
         began = time.perf_counter()
-        spectrum = laplacian.eigenpairs(core.modes_needed(laplacian, max(PARTS)))
+        spectrum = laplacian.eigenpairs(core.spectral.modes_needed(laplacian, max(PARTS)))
         yield Goal("seconds for its modes", form="{:.1f}").row(f"scan, {path.stem}", time.perf_counter() - began)
         wrong, cut, seconds = 0, 0, []
         whole = connected(laplacian.component, laplacian)
         for parts in PARTS:
             began = time.perf_counter()
-            labels = core.segment(laplacian, parts, spectrum=spectrum)
+            labels = core.spectral.segment(laplacian, parts, spectrum=spectrum)
             seconds.append(time.perf_counter() - began)
             wrong += len(np.unique(labels)) != parts or labels.min() < 0
             cut += connected(labels, laplacian) - whole
@@ -117,7 +120,7 @@ def paths():
     points = fibonacci_sphere(8000)
     laplacian = core.build_laplacian(points)
     for distance in (0.3, 1.0, 2.0):
-        reached = np.arccos(np.clip(points @ points[0], -1.0, 1.0))[core.grow(laplacian, [0], distance)].max()
+        reached = np.arccos(np.clip(points @ points[0], -1.0, 1.0))[core.distance.grow(laplacian, [0], distance)].max()
         yield Goal("reach / distance - 1", 0.05, "{:.1%}").row(
             f"grow by {distance:g} on a sphere", reached / distance - 1
         )

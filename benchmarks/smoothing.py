@@ -53,12 +53,15 @@ def exact_area(bumpy):
 
 def methods():
     """Yield the names of the ways to smooth, and functions of the operator."""
-    yield f"{MODES} modes", lambda laplacian: core.smooth_points(laplacian, MODES)
-    yield "fairing", core.fair_points
-    yield "band 0 to 110", lambda laplacian: core.smooth_points(laplacian, core.band(0.0, 110.0))
+    yield f"{MODES} modes", lambda laplacian: core.clean.smooth_points(laplacian, MODES)
+    yield "fairing", core.clean.fair_points
+    yield "band 0 to 110", lambda laplacian: core.clean.smooth_points(laplacian, core.clean.band(0.0, 110.0))
     for keep in (None, "area", "volume"):
         text = f"exponential, {keep or 'nothing'} kept"
-        yield text, lambda laplacian, keep=keep: core.smooth_points(laplacian, core.exponential(0.004), keep=keep)
+        yield (
+            text,
+            lambda laplacian, keep=keep: core.clean.smooth_points(laplacian, core.clean.exponential(0.004), keep=keep),
+        )
 
 
 def harmonics():
@@ -119,7 +122,7 @@ def boundary():
 
     def measure():
         laplacian = core.build_laplacian(points + noise[:, None] * outward)
-        found = core.fair_points(laplacian, dirichlet=True)
+        found = core.clean.fair_points(laplacian, dirichlet=True)
         error = np.linalg.norm(found[:, :2], axis=1) - 2.0
         for rows in (~laplacian.near_boundary, laplacian.near_boundary & ~laplacian.boundary):
             yield np.sqrt(np.mean(noise[rows] ** 2) / np.mean(error[rows] ** 2))
@@ -141,10 +144,10 @@ def signatures():
 
         def measure(points=points):
             spectrum = core.build_laplacian(points).eigenpairs(121)
-            times = core.signature_times(spectrum, 20)
+            times = core.spectral.signature_times(spectrum, 20)
             exact = np.exp(-np.outer(times, sphere_eigenvalues(121))).sum(axis=1) / SPHERE
-            yield np.abs(core.heat_kernel_signature(spectrum, times) / exact - 1.0).max()
-            yield np.abs(core.wave_kernel_signature(spectrum, count=20) * SPHERE - 1.0).max()
+            yield np.abs(core.spectral.heat_kernel_signature(spectrum, times) / exact - 1.0).max()
+            yield np.abs(core.spectral.wave_kernel_signature(spectrum, count=20) * SPHERE - 1.0).max()
 
         goals = [percent("heat, 20 default times, max"), percent("wave, 20 default energies, max")]
         yield from judge(f"signatures, sphere, {COUNT:,} {name}", goals, measure())
@@ -156,9 +159,9 @@ def scaling():
     def measure():
         laplacian = core.build_laplacian(random_sphere(40_000))
         for work in (
-            lambda: core.smooth_points(laplacian, 10),
-            lambda: core.smooth_points(laplacian, 50),
-            lambda: core.fair_points(laplacian),
+            lambda: core.clean.smooth_points(laplacian, 10),
+            lambda: core.clean.smooth_points(laplacian, 50),
+            lambda: core.clean.fair_points(laplacian),
         ):
             began = time.perf_counter()
             work()
@@ -180,7 +183,7 @@ def armadillo():
 
     def measure(count):
         began = time.perf_counter()
-        found = core.smooth_points(laplacian, count)
+        found = core.clean.smooth_points(laplacian, count)
         seconds = time.perf_counter() - began
         yield np.sqrt(np.mean(np.sum((found - points) ** 2, axis=1))) / spacing
         yield seconds

@@ -58,7 +58,7 @@ def run_one(source, modes):
     stages = Stages()
     laplacian = core.build_laplacian(points, progress=stages)
     stages("Curvature", 0.9)
-    core.mean_curvature(laplacian)
+    core.measure.mean_curvature(laplacian)
     if modes:
         laplacian.eigenpairs(modes, progress=stages)
     stages.close()

@@ -39,7 +39,7 @@ def splats_on(laplacian, degree=3, seed=3):
     waves = np.sin(points @ rng.standard_normal((3, 3)) * 4.0)
     rest = np.repeat(0.25 * rng.standard_normal((1, (degree + 1) ** 2 - 1, 3)), len(points), axis=0)
     scales, rotations = np.sqrt(laplacian.areas)[:, None] * sizes, quaternions_of(np.moveaxis(frames, 0, 2))
-    return core.Splats(points, scales, rotations, rng.uniform(0.7, 1.0, len(points)), 1.6 * waves, rest)
+    return core.splats.Splats(points, scales, rotations, rng.uniform(0.7, 1.0, len(points)), 1.6 * waves, rest)
 
 
 def bent_bar():
@@ -47,7 +47,7 @@ def bent_bar():
     points = bar(CELLS, 4 * CELLS)[0]
     laplacian = core.build_laplacian(points)
     reach = 2.5 * LENGTH / (4 * CELLS)
-    deformer = core.Deformer(laplacian, points[:, 0] > LENGTH - reach, points[:, 0] < reach)
+    deformer = core.deform.Deformer(laplacian, points[:, 0] > LENGTH - reach, points[:, 0] < reach)
     moved = deformer.solve(bent_end(points[deformer.handles], 0.5 * np.pi))
     splats = splats_on(laplacian)
     return splats, splats.deformed(moved, deformer.gradients(moved))
@@ -79,7 +79,7 @@ def follow(count):
     splats = splats_on(laplacian)
     quick = replace(splats, harmonics=splats.harmonics[:, :0])
     z = points[:, 2]
-    deformer = core.coarse_deformer(laplacian, z > 0.8, z < -0.8)
+    deformer = core.deform.coarse_deformer(laplacian, z > 0.8, z < -0.8)
     goal = points[deformer.handles] + [0.1, 0.0, 0.5]
     moved = timed(f"{count:,} splats: points", lambda: deformer.solve(goal, steps=1))
     gradients = timed(f"{count:,} splats: gradients", lambda: deformer.gradients(moved))
@@ -102,7 +102,7 @@ def turn_rigidly(splats):
         "operator, floaters left out", lambda: core.build_laplacian(points, left_out=floating_rows(splats)), 1
     )
     along = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][0] @ points.T
-    deformer = timed("binding", lambda: core.coarse_deformer(laplacian, along > np.quantile(along, 0.95)), 1)
+    deformer = timed("binding", lambda: core.deform.coarse_deformer(laplacian, along > np.quantile(along, 0.95)), 1)
     turn, shift = Rotation.from_rotvec([0.5, 1.0, -2.0]).as_matrix(), np.array([1.0, 2.0, 3.0])
     goal = points[deformer.handles] @ turn.T + shift
     moved = timed("points of a quick result", lambda: deformer.solve(goal, steps=1))
@@ -159,20 +159,20 @@ def main():
         follow(count)
     points = np.random.default_rng(0).standard_normal((LARGE, 3))
     ones = np.ones(LARGE)
-    many = core.Splats(
+    many = core.splats.Splats(
         points, np.exp(points), np.tile([1.0, 0, 0, 0], (LARGE, 1)), 0.5 * ones, points, np.zeros((LARGE, 15, 3))
     )
     with TemporaryDirectory() as folder:
         path = Path(folder) / "many.ply"
-        timed(f"{LARGE:,} splats of degree 3: write", lambda: core.write_splats(path, many), 1)
-        timed(f"{LARGE:,} splats of degree 3: read", lambda: core.read_splats(path), 1)
+        timed(f"{LARGE:,} splats of degree 3: write", lambda: core.splats.write_splats(path, many), 1)
+        timed(f"{LARGE:,} splats of degree 3: read", lambda: core.splats.read_splats(path), 1)
         for name in sys.argv[1:]:
-            splats = timed(f"{Path(name).name}: read", lambda name=name: core.read_splats(name))
-            timed(f"{Path(name).name}: write", lambda splats=splats: core.write_splats(path, splats))
+            splats = timed(f"{Path(name).name}: read", lambda name=name: core.splats.read_splats(name))
+            timed(f"{Path(name).name}: write", lambda splats=splats: core.splats.write_splats(path, splats))
             print(f"{Path(name).name}: bit for bit the same: {path.read_bytes() == Path(name).read_bytes()}")
             colored = with_field(splats)
-            core.write_splats(path, colored)
-            again = core.read_splats(path)
+            core.splats.write_splats(path, colored)
+            again = core.splats.read_splats(path)
             same = all((getattr(again, each) == getattr(colored, each)).all() for each in ("positions", "harmonics"))
             print(f"with a field of degree 3: places and harmonics come back the same: {same}")
             turn_rigidly(colored)

@@ -21,7 +21,7 @@ FOLLOWED = 20_000, 100_000
 def random_splats(core, positions, size):
     """Return splats of a size and of random colors at some places."""
     rng, count = np.random.default_rng(0), len(positions)
-    return core.Splats(
+    return core.splats.Splats(
         positions=positions,
         scales=size * np.exp(0.3 * rng.standard_normal((count, 3))),
         rotations=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
@@ -34,7 +34,7 @@ def random_splats(core, positions, size):
 def in_and_out(core, folder, count):
     """Print the seconds of an import and an export, and whether all bytes are the same."""
     given, written = folder / "given.ply", folder / "written.ply"
-    core.write_splats(given, random_splats(core, np.random.default_rng(1).standard_normal((count, 3)), 0.01))
+    core.splats.write_splats(given, random_splats(core, np.random.default_rng(1).standard_normal((count, 3)), 0.01))
     began = time.perf_counter()
     bpy.ops.meshfree.import_points(filepath=str(given))
     between = time.perf_counter()
@@ -52,7 +52,7 @@ def follow(core, folder, count):
     z = 1.0 - (np.arange(count) + 0.5) / (0.5 * count)
     ring = np.sqrt(1.0 - z**2) * np.exp(2.39996j * np.arange(count))
     path = folder / "ball.ply"
-    core.write_splats(path, random_splats(core, np.column_stack([ring.real, ring.imag, z]), count**-0.5))
+    core.splats.write_splats(path, random_splats(core, np.column_stack([ring.real, ring.imag, z]), count**-0.5))
     bpy.ops.meshfree.import_points(filepath=str(path), up="Z")
     obj = bpy.context.object
     for name, members in (("Handle", z > 0.8), ("Anchor", z < -0.8)):

@@ -23,7 +23,7 @@ DOCUMENT = Path(__file__).parents[1] / "docs" / "strays.md"
 SHARES = 0.01, 0.05, 0.1
 TUNED = "rocker-arm", "cat", "arm", "cheburashka", "screwdriver", "fandisk"
 ABOUT = """\
-`core.stray_points` at its defaults. Stray points are added as a share of the points: *box*, all over 1.2 times the
+`mf.clean.stray_points` at its defaults. Stray points are added as a share of the points: *box*, all over 1.2 times the
 bounding box; *near*, 2 to 6 spacings off the surface along its normals, to either side; *clumps*, floating heaps of 3
 to 29 points, at least 8 spacings from the surface and 12 from each other, as many as there is room for. Marked are
 those farther than two spacings from the nearest point of the cloud. Each figure: found share of the marked ones, and
@@ -100,14 +100,14 @@ def measure(points, sort, share, strictness=1.0):
     """Found share of the marked stray points, and taken share of the cloud."""
     extra = SORTS[sort](points, share)
     extra = extra[marked(points, extra)]
-    found = core.stray_points(np.concatenate([points, extra]), strictness=strictness)
+    found = core.clean.stray_points(np.concatenate([points, extra]), strictness=strictness)
     return found[len(points) :].mean() if len(extra) else np.nan, found[: len(points)].mean()
 
 
 def row_of(name, points, sorts):
     """A row of the table, and its figures."""
     began = time.perf_counter()
-    alone = core.stray_points(points).mean()
+    alone = core.clean.stray_points(points).mean()
     seconds = time.perf_counter() - began
     figures = [measure(points, sort, share) for sort in sorts for share in SHARES]
     cells = [f"{found:.1%} / {wrong:.2%}" if np.isfinite(found) else "-" for found, wrong in figures]

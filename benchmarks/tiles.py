@@ -52,7 +52,7 @@ def as_a_whole(points, agreed):
     """Measure a cloud as a whole by a record."""
     whole = core.build_laplacian(points, agreed=agreed)
     found = {name: getattr(whole, name) for name in (*FIRST, "areas", "boundary", "component")}
-    found["mean_curvature"] = core.mean_curvature(whole)
+    found["mean_curvature"] = core.measure.mean_curvature(whole)
     found["sides"] = np.sign(np.einsum("ij,ij->i", whole.normals, agreed.side))
     return found
 
@@ -187,7 +187,7 @@ def whole_seconds():
     """Return the CPU seconds that a point takes in a cloud of 200,000 as a whole."""
     points = torus_points(WHOLE)
     began = time.process_time()
-    core.mean_curvature(core.build_laplacian(points))
+    core.measure.mean_curvature(core.build_laplacian(points))
     return (time.process_time() - began) / WHOLE
 
 

@@ -42,11 +42,11 @@ def cat():
     """Weights of the cat's vertices on random points of its faces."""
     vertices, faces, _ = shapes()["cat"]
     source = core.build_laplacian(vertices)
-    weights = core.bone_weights(source, *bones())
+    weights = core.rig.bone_weights(source, *bones())
     points, rows = random_points(vertices, faces, POINTS)
     truth = in_triangles(weights, faces, vertices, points, rows)
     target = core.build_laplacian(points)
-    match = core.match_surface(target, source)
+    match = core.rig.match_surface(target, source)
     rng = np.random.default_rng(1)
     distance = cKDTree(points[rng.choice(POINTS, PATCHES, replace=False)]).query(points)[0]
     cases = {
@@ -58,7 +58,7 @@ def cat():
 
         def measure(chosen=chosen):
             began = time.process_time()
-            error = np.abs(core.transfer_values(target, only(match, chosen), weights) - truth)
+            error = np.abs(core.rig.transfer_values(target, only(match, chosen), weights) - truth)
             yield error.mean()
             yield error.max()
             yield np.count_nonzero(error.max(axis=1) > 0.1)
@@ -90,7 +90,9 @@ def socks():
                 def measure(pair=pair, ball=ball, kind=kind, shift=shift, spacing=spacing):
                     source, target = (core.build_laplacian(pair(points)) for points in (ball, ball @ ROTATION.T))
                     first = np.arange(len(target.points)) < len(ball)
-                    found = core.transfer_values(target, core.match_surface(target, source), first.astype(float))
+                    found = core.rig.transfer_values(
+                        target, core.rig.match_surface(target, source), first.astype(float)
+                    )
                     middle = target.points - [0.5 * shift, 0.0, 0.0]
                     away = (kind == "around") | (np.linalg.norm(middle, axis=1) > 2.0 * spacing)
                     yield np.abs(found - first)[away].max()

@@ -188,4 +188,4 @@ def told_sides(found, name, length_text) -> Told:
 
 
 def _transport(laplacian, cache, progress):
-    return cache.result(laplacian, "transport", compute=lambda: core.Transport(laplacian, progress=progress))
+    return cache.result(laplacian, "transport", compute=lambda: core.distance.Transport(laplacian, progress=progress))

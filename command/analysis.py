@@ -15,7 +15,7 @@ class Built(NamedTuple):
     """An operator and the mean curvature computed by it."""
 
     laplacian: "core.LaplaceBeltrami"
-    curvature: "core.MeanCurvature"
+    curvature: "core.measure.MeanCurvature"
 
     @property
     def mean_curvature(self) -> np.ndarray:
@@ -54,7 +54,7 @@ def build(points, options, boundary, left_out, progress) -> Built:
         laplacian = core.build_laplacian(points, options=options, boundary=boundary, **given)
     progress("Curvature", 1.0)
     laplacian = replace(laplacian, notices=[*floating_notices(left_out), *laplacian.notices])
-    return Built(laplacian, core.measure_mean_curvature(laplacian))
+    return Built(laplacian, core.measure.measure_mean_curvature(laplacian))
 
 
 def oriented(built, orientation) -> Built:
@@ -123,7 +123,7 @@ def continued(spectrum, areas, points, earlier):
     count = spectrum.eigenvectors.shape[1]
     spectrum, overlaps = replace(spectrum, eigenvalues=spectrum.eigenvalues[:count]), np.ones(count)
     if earlier is not None:
-        matched = core.match_modes(spectrum, areas, points, *earlier)
+        matched = core.spectral.match_modes(spectrum, areas, points, *earlier)
         spectrum, overlaps = matched.spectrum, matched.overlaps
     return spectrum, overlaps, (spectrum, points)
 

@@ -22,7 +22,7 @@ class SplatInfo(Verb):
     inputs = "files of splats"
 
     def run(self, path, arguments, output):
-        splats = core.read_splats(path)
+        splats = core.splats.read_splats(path)
         axes = np.sort(splats.scales, axis=1)
 
         def quantiles(values):
@@ -73,13 +73,13 @@ class Deform(Verb):
         anchors = [_members(one, points, "anchors") for one in wanted.get("anchors", [])]
         out = core.splats.floating_rows(splats) if splats is not None else ()
         laplacian = core.build_laplacian(points, left_out=out)
-        deformer = core.CoarseDeformer(laplacian, handles, np.unique(np.concatenate(anchors)) if anchors else ())
+        deformer = core.deform.CoarseDeformer(laplacian, handles, np.unique(np.concatenate(anchors)) if anchors else ())
         moved = deformer.solve(goal)
         written = []
         if splats is None:
             written = core.files.write_points(output, replace(given, points=moved), double=not given.single)
         else:
-            core.write_splats(output, splats.deformed(moved, deformer.gradients(moved)))
+            core.splats.write_splats(output, splats.deformed(moved, deformer.gradients(moved)))
         farthest = float(np.linalg.norm(moved - points, axis=1).max())
         notices = [*given.notices, *deformer.notices, *written]
         return {"points": len(points), "farthest": farthest, "left_out": len(out), "notices": notices}

@@ -81,7 +81,7 @@ def thinner(points, by, spacing, count, keep_edges):
         least = (spacing or _SPACINGS * core.geometry.typical_distance(points)) or None
         size = {"count": count} if by == "NUMBER" or least is None else {"spacing": least}
         kept = np.zeros(len(points), dtype=bool)
-        kept[core.thin_out(points, keep_edges=keep_edges, progress=progress, **size)] = True
+        kept[core.clean.thin_out(points, keep_edges=keep_edges, progress=progress, **size)] = True
         return kept, size.get("spacing")
 
     return compute

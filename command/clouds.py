@@ -43,7 +43,7 @@ def read_file(path, columns="", las=None):
 
 def positions(given):
     """Return the positions of the points or splats that a file holds, (n, 3)."""
-    return given.positions if isinstance(given, core.Splats) else given.points
+    return given.positions if isinstance(given, core.splats.Splats) else given.points
 
 
 class Cloud:
@@ -66,7 +66,7 @@ class Cloud:
 
     def __init__(self, path, given, floaters=True):
         self.path, self.given, self.notices = path, given, list(given.notices)
-        self.splats = given if isinstance(given, core.Splats) else None
+        self.splats = given if isinstance(given, core.splats.Splats) else None
         places = np.asarray(positions(given), dtype=np.float64)
         self.place = core.files.choose_origin(places, degrees=getattr(given, "degrees", False))
         self.points = core.check_points(places - self.place)
@@ -109,7 +109,7 @@ def moved(given, points, matrix, place):
         To which the result is relative.
     """
     linear, after = matrix[:3, :3], points @ matrix[:3, :3].T + matrix[:3, 3] + place
-    if isinstance(given, core.Splats):
+    if isinstance(given, core.splats.Splats):
         return given.deformed(after, np.broadcast_to(linear, (len(after), 3, 3)))
     columns = dict(given.attributes)
     if np.ndim(columns.get(_FILE_NORMAL)) == 2:
@@ -139,7 +139,7 @@ def write(path, given, results, arrays=None) -> list:
     list of str
         Notices of what is written in another form.
     """
-    splats = isinstance(given, core.Splats)
+    splats = isinstance(given, core.splats.Splats)
     if path.suffix.lower() == ".npz":
         points = np.asarray(given.positions if splats else given.points, dtype=np.float64)
         named = {name.removeprefix(PREFIX): values for name, values in results.items()}
@@ -148,7 +148,7 @@ def write(path, given, results, arrays=None) -> list:
     if splats:
         if path.suffix.lower() != ".ply":
             raise core.PointCloudError(f"Splats cannot be written to {path}. Let its name end in .ply.")
-        core.write_splats(path, with_columns(given, {name: _narrow(values) for name, values in results.items()}))
+        core.splats.write_splats(path, with_columns(given, {name: _narrow(values) for name, values in results.items()}))
         return []
     return core.files.write_points(path, with_results(given, results), double=not given.single)
 

@@ -48,7 +48,7 @@ class Sided(NamedTuple):
 
     def sides(self):
         """Return 1 where normals point to the outer side, -1 where to the inner one, 0 where nothing tells, (n,)."""
-        sides = core.outer_sides(self.laplacian)
+        sides = core.measure.outer_sides(self.laplacian)
         if self.orientation is None:
             return sides
         chosen = self.orientation.any(axis=1) & (self.laplacian.component >= 0)
@@ -68,8 +68,8 @@ class Compared(NamedTuple):
         Of both analyses, and of what is in doubt or not compared.
     """
 
-    found: "core.Deviation"
-    aligned: "core.Alignment | None"
+    found: "core.measure.Deviation"
+    aligned: "core.measure.Alignment | None"
     notices: list
 
 
@@ -101,22 +101,27 @@ def compared(points, own, other, settings, names, advice, progress):
         target = other(_share(progress, 0.4, 0.4))
     laplacian, aligned, turn = target.laplacian, None, np.eye(3)
     if settings.align_first:
-        aligned = core.align(points, laplacian.points, progress=lambda stage, _: progress(stage, 0.8))
+        aligned = core.measure.align(points, laplacian.points, progress=lambda stage, _: progress(stage, 0.8))
         check_found(aligned, *names, advice)
         turn = aligned.matrix[:3, :3]
         points = points @ turn.T + aligned.matrix[:3, 3]
     measure = _share(progress, 0.8, 0.2)
     notices = [f"{names[1]}: {notice}" for notice in laplacian.notices]
     if nearest:
-        found, kept = core.surface_deviation(points, None, laplacian, settings.greatest or None, progress=measure), None
+        found, kept = (
+            core.measure.surface_deviation(laplacian, points, None, settings.greatest or None, progress=measure),
+            None,
+        )
     else:
         kept = surface.laplacian.component >= 0
         normals = surface.laplacian.normals[kept] @ turn.T
         sides = surface.sides()[kept]
-        beyond = core.sides_beside(laplacian, target.sides(), points[kept], normals)
+        beyond = core.measure.sides_beside(laplacian, target.sides(), points[kept], normals)
         normals *= np.where((sides == 0.0) & (beyond != 0.0), beyond, 1.0)[:, None]
-        part = core.surface_deviation(points[kept], normals, laplacian, settings.greatest or None, progress=measure)
-        found = core.Deviation(*(np.zeros(len(points), dtype=values.dtype) for values in part))
+        part = core.measure.surface_deviation(
+            laplacian, points[kept], normals, settings.greatest or None, progress=measure
+        )
+        found = core.measure.Deviation(*(np.zeros(len(points), dtype=values.dtype) for values in part))
         for whole, values in zip(found, part, strict=True):
             whole[kept] = values
         notices = [*surface.laplacian.notices, *notices]

@@ -123,7 +123,7 @@ def solved(laplacian, shares, source, low, high, cache, progress):
         source,
         fixed,
         values,
-        compute=lambda: core.solve_poisson(laplacian, source, fixed, values, progress=progress),
+        compute=lambda: core.distance.solve_poisson(laplacian, source, fixed, values, progress=progress),
     )
 
 
@@ -134,7 +134,7 @@ def harmonic(laplacian, fixed, given, cache, progress):
         "harmonic",
         fixed,
         given,
-        compute=lambda: core.harmonic_field(laplacian, fixed, given, progress=progress),
+        compute=lambda: core.distance.harmonic_field(laplacian, fixed, given, progress=progress),
     )
 
 

@@ -80,9 +80,11 @@ def part_table(laplacian, labels, values, volume_of, progress):
 
 def _rows(laplacian, kind, labels, values, progress):
     """Return the rows of all parts of a kind."""
-    found = core.measure_parts(laplacian, labels, progress=progress)
+    found = core.measure.measure_parts(laplacian, labels, progress=progress)
     means = (
-        core.part_means(laplacian, values, labels) if values is not None else np.full((2, len(found.labels)), np.nan)
+        core.measure.part_means(laplacian, values, labels)
+        if values is not None
+        else np.full((2, len(found.labels)), np.nan)
     )
     columns = (
         found.points,
@@ -175,15 +177,17 @@ class Base(NamedTuple):
 def pile_over(laplacian, chosen, base, measures, progress):
     """Measure the volume between a part, (n,) bool, and a `Base`, None for the plane through its rim."""
     if base is None:
-        return core.pile_volume(laplacian, chosen, measures=measures)
+        return core.measure.pile_volume(laplacian, chosen, measures=measures)
     heights = None
     if base.ground is not None:
         rows = np.flatnonzero(chosen & (laplacian.component >= 0))
         points, normals = laplacian.surface_points[rows] + base.shift, np.broadcast_to(base.normal, (len(rows), 3))
-        found = core.surface_deviation(points, normals, base.ground(progress), progress=progress)
+        found = core.measure.surface_deviation(base.ground(progress), points, normals, progress=progress)
         heights = np.full(len(chosen), nan)
         heights[rows] = np.where(found.known, found.distance, nan)
-    return core.pile_volume(laplacian, chosen, plane=(base.point, base.normal), heights=heights, measures=measures)
+    return core.measure.pile_volume(
+        laplacian, chosen, plane=(base.point, base.normal), heights=heights, measures=measures
+    )
 
 
 def base_of(plane, normal, place, ground=None, ground_place=None, name=""):
@@ -243,7 +247,7 @@ def volumes_over(laplacian, rows, labels, base, progress):
     """
     if base is None:
         return [{} for _ in rows], []
-    measures, volumes, notices, failed = core.SurfaceMeasures(laplacian), [], [], []
+    measures, volumes, notices, failed = core.measure.SurfaceMeasures(laplacian), [], [], []
     for row in rows:
         kind, label = row.name.split()
         part = (laplacian.component if kind == "Component" else labels) == int(label)

@@ -19,7 +19,7 @@ class Mesh(SurfaceVerb):
     def work(self, path, given, arguments, output, progress):
         cloud = clouds.Cloud(path, given, floaters(arguments))
         laplacian = self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress).laplacian
-        mesh = core.mesh_surface(laplacian, **chosen(self.settings, arguments), progress=progress)
+        mesh = core.surface.mesh_surface(laplacian, **chosen(self.settings, arguments), progress=progress)
         closed, opened = close_gaps(mesh.faces)
         faces, written = [mesh.faces, closed], []
         if output is not None:
@@ -38,7 +38,7 @@ def _on_vertices(cloud, laplacian, vertices):
     single = cloud.splats is not None or cloud.given.single
     table = core.files.PointTable(vertices + cloud.place, single=single)
     if cloud.columns or tint is not None:
-        carrying, count = core.values_on_mesh(laplacian, vertices), len(vertices)
+        carrying, count = core.surface.values_on_mesh(laplacian, vertices), len(vertices)
         for name, values in cloud.columns.items():
             carry = carrying.interpolate if values.dtype.kind == "f" else carrying.labels
             table.attributes[name] = carry(values)[-count:]

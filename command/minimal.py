@@ -41,7 +41,7 @@ def shrink(points, boundary, tolerance, steps, options, progress):
     def report(stage, fraction):
         progress("Steps", min(1.0, (count + fraction) / steps))
 
-    film = core.minimal_surface(
+    film = core.deform.minimal_surface(
         points,
         boundary,
         epsilon=tolerance,

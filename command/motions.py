@@ -225,7 +225,7 @@ def _pushed(values, pulse):
 
 def _heat(laplacian, chosen, cache, progress):
     distance = _reach(laplacian, chosen)
-    heat = core.Heat(laplacian, 0.25 * distance * distance * chosen.share, progress=progress)
+    heat = core.motion.Heat(laplacian, 0.25 * distance * distance * chosen.share, progress=progress)
 
     def begin(state, number):
         pulse = _pulse(laplacian, chosen, chosen.starts(number), cache, progress)
@@ -236,7 +236,7 @@ def _heat(laplacian, chosen, cache, progress):
 
 def _wave(laplacian, chosen, cache, progress):
     distance = _reach(laplacian, chosen)
-    wave = core.Wave(laplacian, chosen.share, distance, progress=progress)
+    wave = core.motion.Wave(laplacian, chosen.share, distance, progress=progress)
 
     def begin(state, number):
         pulse = _pulse(laplacian, chosen, chosen.starts(number), cache, progress)
@@ -252,7 +252,7 @@ def _reaction(laplacian, chosen, cache, progress):
     automatic = max(resolved, math.sqrt(float(laplacian.areas[known].sum())) / _ACROSS)
     size, time = chosen.distance or automatic, _PATTERN_TIME * chosen.share
     steps = math.ceil(time / _LONGEST)
-    kind = core.ReactionDiffusion
+    kind = core.motion.ReactionDiffusion
     reaction = kind.of_pattern(laplacian, time / steps, chosen.pattern, size, progress=progress)
     chosen = chosen._replace(width=_SEED * size)  # a single point would fade before it reacts
 

@@ -96,7 +96,7 @@ def _write(output, cloud, points, laplacian, arrays=None) -> list:
     """
     given, moved = cloud.given, points - cloud.points
     if cloud.splats is not None:
-        after = given.deformed(given.positions + moved, core.deformation_gradients(laplacian, points))
+        after = given.deformed(given.positions + moved, core.deform.deformation_gradients(laplacian, points))
         places = after.positions
     else:
         places = given.points + moved  # so that points that stay keep all of their digits

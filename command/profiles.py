@@ -65,7 +65,9 @@ def path_between(laplacian, ends, cache, progress):
         laplacian,
         "path",
         ends,
-        compute=lambda: core.geodesic_path(laplacian, *ends.tolist(), geodesics=cache.geodesics(laplacian, progress)),
+        compute=lambda: core.distance.geodesic_path(
+            laplacian, *ends.tolist(), geodesics=cache.geodesics(laplacian, progress)
+        ),
     )
 
 
@@ -85,7 +87,7 @@ def measured(laplacian, path, given, own, base, origin) -> Measured:
     """
     across = AXES.index(own.axis)
     heights = laplacian.points[:, across]
-    found = core.profile(laplacian, path, np.column_stack([heights] if given is None else [heights, given]))
+    found = core.measure.profile(laplacian, path, np.column_stack([heights] if given is None else [heights, given]))
     values, off = found.values[:, -1], found.uncertainty
     if given is None:
         values = base[across] + path[:, across]  # on the surface, as between its points

@@ -40,7 +40,9 @@ class Align(CloudVerb):
             self._target = clouds.Cloud(reference, self.read(reference, arguments))
         cloud, target = clouds.Cloud(path, given), self._target
         shift = cloud.place - target.place
-        found = core.align(cloud.points + shift, target.points, **chosen(self.settings, arguments), progress=progress)
+        found = core.measure.align(
+            cloud.points + shift, target.points, **chosen(self.settings, arguments), progress=progress
+        )
         alignment.check_found(found, path.stem, reference.stem)
         written = []
         if output is not None:

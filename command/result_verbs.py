@@ -62,7 +62,7 @@ class PrincipalCurvatures(ResultVerb):
     help = "compute principal curvatures and directions, shape index and curvedness"
 
     def compute(self, built, wanted, name, own, progress):
-        found = core.principal_curvatures(built.laplacian)
+        found = core.measure.principal_curvatures(built.laplacian)
         values = {row.attribute: row.of(found) for row in rows_of(self.operator)}
         return Told(values, found.notices, f"{name}: {results.curvature_line(found)}")
 
@@ -74,7 +74,7 @@ class SurfaceVariation(ResultVerb):
     help = "measure how far the neighborhood of each point is from a plane: edges, corners and noise are large"
 
     def compute(self, built, wanted, name, own, progress):
-        found = core.surface_variation(built.laplacian)
+        found = core.measure.surface_variation(built.laplacian)
         return self.named(Told(found, [], f"{name}: {results.variation_line(found)}"))
 
 
@@ -87,7 +87,7 @@ class Roughness(ResultVerb):
 
     def compute(self, built, wanted, name, own, progress):
         results.check_wavelength(own.wavelength, built.laplacian.points, name)
-        found = core.roughness(built.laplacian, own.wavelength or None, progress=progress)
+        found = core.clean.roughness(built.laplacian, own.wavelength or None, progress=progress)
         return self.named(Told(found, [], f"{name}: {results.roughness_line(found, number_text)}"))
 
 

@@ -33,15 +33,15 @@ def _by_mode(laplacian, mode, cache, progress):
     """Divide the points by the signs of a mode."""
     vector = cache.lowest_modes(laplacian, mode, progress).eigenvectors[:, mode - 1]
     progress("Regions", 0.5)
-    return core.nodal_domains(vector, laplacian)
+    return core.spectral.nodal_domains(laplacian, vector)
 
 
 def _by_shape(laplacian, parts, cache, progress):
     """Divide the points into parts, by kept modes if there are enough."""
-    count, spectrum = core.modes_needed(laplacian, parts), None
+    count, spectrum = core.spectral.modes_needed(laplacian, parts), None
     if cache.known_modes(laplacian) >= count:
         spectrum, _ = analysis.resolved_modes(count, lambda many: cache.lowest_modes(laplacian, many, progress))
-    return core.segment(laplacian, parts, spectrum=spectrum, progress=progress)
+    return core.spectral.segment(laplacian, parts, spectrum=spectrum, progress=progress)
 
 
 def parts_line(found, name) -> str:
@@ -52,7 +52,7 @@ def parts_line(found, name) -> str:
 
 def signatures(laplacian, kind, count, modes, cache, progress):
     """Return signatures, (n, count), by the values of the settings in `SIGNATURE`."""
-    signature = core.heat_kernel_signature if kind == "HEAT" else core.wave_kernel_signature
+    signature = core.spectral.heat_kernel_signature if kind == "HEAT" else core.spectral.wave_kernel_signature
     return signature(cache.lowest_modes(laplacian, modes, progress), count=count)
 
 

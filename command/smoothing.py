@@ -86,7 +86,7 @@ def smoothed(laplacian, own, mask, name, cache, progress):
         )
     check_wavelength(own.wavelength, laplacian.points, name)
     shared = {"strength": own.strength, "mask": mask, "keep": keep}
-    blend = core.PointBlend(laplacian, dirichlet=dirichlet, **shared)
+    blend = core.clean.PointBlend(laplacian, dirichlet=dirichlet, **shared)
     method, modes, gain, wavelength = own.method, own.modes, own.gain, own.wavelength
     settings = (
         method,
@@ -118,25 +118,25 @@ def smoothed(laplacian, own, mask, name, cache, progress):
 def _filtered(laplacian, method, dirichlet, modes, wavelength, gain, cache, progress):
     """Return the points, (n, 3), by a method at full strength."""
     if method == "EDGES":
-        return core.clean_points(laplacian, dirichlet=dirichlet, progress=progress)
+        return core.clean.clean_points(laplacian, dirichlet=dirichlet, progress=progress)
     base = cache.result(
         laplacian,
         "base",
         dirichlet,
-        compute=lambda: core.smoothing_base(laplacian, dirichlet=dirichlet, progress=progress),
+        compute=lambda: core.clean.smoothing_base(laplacian, dirichlet=dirichlet, progress=progress),
     )
     settings = {"dirichlet": dirichlet, "progress": progress, "base": base}
     length = np.median(laplacian.smoothing_lengths)
     if method == "NOISE":
-        return core.fair_points(laplacian, (wavelength / (2.0 * np.pi)) ** 2 if wavelength else None, **settings)
+        return core.clean.fair_points(laplacian, (wavelength / (2.0 * np.pi)) ** 2 if wavelength else None, **settings)
     if method == "MODES":
         spectrum = cache.lowest_modes(laplacian, modes, progress, dirichlet, raw=True)
-        return core.smooth_points(laplacian, modes, spectrum, **settings)
+        return core.clean.smooth_points(laplacian, modes, spectrum, **settings)
     if method == "HEAT":
         squared = ((wavelength or _HEAT * length) / (2.0 * np.pi)) ** 2
-        return core.smooth_points(laplacian, core.exponential(np.log(2.0) * squared), **settings)
+        return core.clean.smooth_points(laplacian, core.clean.exponential(np.log(2.0) * squared), **settings)
     low = (2.0 * np.pi / (wavelength or _DETAIL * length)) ** 2
-    return core.smooth_points(laplacian, core.boost(gain, low, _FINEST**2 * low), **settings)
+    return core.clean.smooth_points(laplacian, core.clean.boost(gain, low, _FINEST**2 * low), **settings)
 
 
 def smooth_line(before, after, name, length_text) -> str:
@@ -149,7 +149,7 @@ def smooth_line(before, after, name, length_text) -> str:
 def by_mode(laplacian, mode, amplitude, phase, cache, progress):
     """Return points, (n, 3), displaced along their normals, by the values of the settings in `MODE_SHAPE`."""
     vector = cache.lowest_modes(laplacian, mode, progress).eigenvectors[:, mode - 1]
-    return core.displace_by_mode(laplacian, vector, amplitude or None, phase=phase)
+    return core.clean.displace_by_mode(laplacian, vector, amplitude or None, phase=phase)
 
 
 def mode_line(before, after, mode, name, length_text) -> str:

@@ -64,7 +64,7 @@ class Match(NamedTuple):
     """
 
     laplacian: "core.LaplaceBeltrami"
-    places: "core.SurfaceMatch"
+    places: "core.rig.SurfaceMatch"
     state: np.ndarray
     notices: list
 
@@ -98,7 +98,7 @@ def matched(laplacian, sources, offsets, own, name, names, progress, members=Non
     members : ndarray, (n,) bool, optional
         See `match_surface`.
     """
-    places = core.match_surface(
+    places = core.rig.match_surface(
         laplacian,
         sources,
         offsets=offsets,
@@ -184,12 +184,12 @@ def taken(match, arrays, smooth, progress) -> dict:
     result = {}
     if smooth:
         columns = [arrays[name].reshape(len(arrays[name]), -1) for name in smooth]
-        found = core.transfer_values(match.laplacian, match.places, np.column_stack(columns), progress=progress)
+        found = core.rig.transfer_values(match.laplacian, match.places, np.column_stack(columns), progress=progress)
         ends = np.cumsum([column.shape[1] for column in columns])[:-1]
         for name, part in zip(smooth, np.split(found, ends, axis=1), strict=True):
             result[name] = part.reshape(len(part), *arrays[name].shape[1:])
     labels = [name for name in arrays if name not in smooth]
     if labels:
-        rows = core.transfer_labels(match.laplacian, match.places, np.arange(match.places.weights.shape[1]))
+        rows = core.rig.transfer_labels(match.laplacian, match.places, np.arange(match.places.weights.shape[1]))
         result |= {name: arrays[name][rows] for name in labels}
     return {name: result[name] for name in arrays}

@@ -10,7 +10,7 @@ def result(laplacian, *settings, compute):
 
 def geodesics(laplacian, progress):
     """Return the solver of geodesic distances of an operator."""
-    return core.Geodesics(laplacian, progress=progress)
+    return core.distance.Geodesics(laplacian, progress=progress)
 
 
 def lowest_modes(laplacian, count, progress, dirichlet=False, raw=False):

@@ -84,7 +84,7 @@ class Convert(CloudVerb):
     def work(self, path, given, arguments, output, progress):
         if output is None:
             raise core.PointCloudError("Nothing would be written. Give --out or --out-dir.")
-        if isinstance(given, core.Splats):
+        if isinstance(given, core.splats.Splats):
             lost = ["Of splats, .npz holds the positions only."] if output.suffix.lower() == ".npz" else []
             return {"points": len(given)}, [*clouds.write(output, given, {}), *lost]
         columns = given.attributes if given.colors is None else {**given.attributes, "colors": given.colors}
@@ -207,7 +207,7 @@ class Measure(ReferenceVerb):
 
 
 def _volume(laplacian, progress):
-    return core.enclosed_volume(laplacian, progress=progress)
+    return core.measure.enclosed_volume(laplacian, progress=progress)
 
 
 class StrayPoints(CloudVerb):
@@ -224,7 +224,7 @@ class StrayPoints(CloudVerb):
     def work(self, path, given, arguments, output, progress):
         cloud, own = clouds.Cloud(path, given), chosen(self.settings, arguments)
         action, strictness = own.pop("action"), own.pop("strictness")
-        found = core.Strays(cloud.points, progress=progress).chosen(strictness, **own)
+        found = core.clean.Strays(cloud.points, progress=progress).chosen(strictness, **own)
         found[cloud.out] = True
         check_some_stay(found)
         written = []

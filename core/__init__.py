@@ -1,7 +1,19 @@
 """Mesh-free discrete Laplace-Beltrami operator on point clouds: numpy and scipy only, usable without Blender.
 
-`build_laplacian` makes the operator of a cloud, and nearly all else takes that operator. Lengths are in the unit of the
-points, [L].
+`build_laplacian` makes the operator of a cloud, and nearly all else takes that operator, first. Here is what everyone
+needs; what the operator is for is in a namespace a topic:
+
+- `clean` gives fewer, smoother and better points,
+- `measure` curvature, areas, lengths, volumes, sections, and one cloud on or beside another,
+- `distance` distances, paths and directions along a surface, and functions between given values,
+- `spectral` what the modes are for: descriptors, matching, segments,
+- `deform` surfaces that bend by handles, or shrink to the least area,
+- `rig` weights of bones, their transfer, and surfaces that follow bones,
+- `motion` heat, waves and reactions,
+- `surface` meshes and discs,
+- `splats` Gaussian splats, `files` point files, `tiles` clouds larger than the memory, `paper` the paper as it stands.
+
+Lengths are in the unit of the points, [L].
 
 Examples in the docstrings can be copied as they are. All but one begin with the same three lines, for 800 points of the
 unit sphere, where answers are known:
@@ -21,15 +33,18 @@ from typing import Any
 
 from .errors import BrokenLibraryError
 
+_ROOT = Path(__file__).parent
 
-def _read_homes() -> dict[str, str]:
-    """Return the module of each public name or package, from the stub, which type checkers read, too."""
-    stub = ast.parse(Path(__file__).with_name("__init__.pyi").read_text(encoding="utf-8"))
-    imports = [node for node in stub.body if isinstance(node, ast.ImportFrom)]
+
+def _read(file: str) -> dict[str, str]:
+    """Return the module of each public name or package that a file lists, as type checkers read it."""
+    listed = ast.parse((_ROOT / file).read_text(encoding="utf-8"))
+    imports = [node for node in listed.body if isinstance(node, ast.ImportFrom)]
     return {alias.name: node.module or alias.name for node in imports for alias in node.names}
 
 
-_HOMES = _read_homes()
+_HOMES = _read("__init__.pyi")
+_NAMESPACES = [name for name, home in _HOMES.items() if name == home]
 _lock = threading.RLock()  # scipy imports itself in circles, which two threads at once might enter from two sides
 
 __all__ = sorted(name for name, home in _HOMES.items() if name != home)
@@ -40,7 +55,7 @@ def __getattr__(name: str) -> Any:
     if name == "__version__":
         return _version()
     if name not in _HOMES and name not in _HOMES.values():
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        raise AttributeError(_missing(name))
     home = _HOMES.get(name, name)
     with _lock:
         module = _import(home)
@@ -53,9 +68,17 @@ def __dir__() -> list[str]:
     return sorted({*globals(), *_HOMES, "__version__"})
 
 
+def _missing(name: str) -> str:
+    """Tell which namespace gives a name that is not here, if any does."""
+    for space in _NAMESPACES:
+        if name in _read(f"{space}/__init__.py"):
+            return f"`mf.{name}` is `mf.{space}.{name}`"
+    return f"module {__name__!r} has no attribute {name!r}"
+
+
 def _version() -> str:
     """Return the version: of the extension or the tree that this is in, or of the installed wheel."""
-    manifest = Path(__file__).parents[1] / "blender_manifest.toml"
+    manifest = _ROOT.parent / "blender_manifest.toml"
     if not manifest.exists():
         from importlib import metadata  # here, as it takes as long as all else of this module
 

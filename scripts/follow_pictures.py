@@ -74,7 +74,7 @@ def as_splats(points, laplacian):
     side /= np.linalg.norm(side, axis=1, keepdims=True)
     frames = np.stack([side, np.cross(normals, side), normals], axis=2)
     shade = 0.3 + 0.7 * np.maximum(normals @ (LIGHT / np.linalg.norm(LIGHT)), 0.0)
-    splats = core.Splats(
+    splats = core.splats.Splats(
         positions=points,
         scales=radii[:, None] * [1.3, 1.3, 0.05],
         rotations=core.splats.ellipsoids.quaternions_of(np.moveaxis(frames, 0, 2)),
@@ -84,7 +84,7 @@ def as_splats(points, laplacian):
     )
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "armadillo.ply"
-        core.write_splats(path, splats)
+        core.splats.write_splats(path, splats)
         bpy.ops.meshfree.import_points(filepath=str(path), up="Z")
     return bpy.context.object
 
@@ -164,7 +164,7 @@ def rig_wave(path):
     core = studio.part("core")
     (scan,) = scan_pictures.scan("armadillo")
     points = studio.world_points(scan)
-    points = points[core.thin_out(points, count=WAVING)]
+    points = points[core.clean.thin_out(points, count=WAVING)]
     splats = as_splats(points, core.build_laplacian(points))
     bpy.data.objects.remove(scan)
     rig = rigged(splats)

@@ -43,7 +43,7 @@ def harmonics():
 
 def colored_sphere(laplacian, values, amplitude=0.0):
     """Add a sphere that shows values, displaced by them."""
-    points = studio.part("core").displace_by_mode(laplacian, values, amplitude) if amplitude else laplacian.points
+    points = studio.part("core").clean.displace_by_mode(laplacian, values, amplitude) if amplitude else laplacian.points
     obj = studio.make_object(points, "Sphere")
     studio.part("operators.objects.attributes").write_attribute(obj.data, "Mode", values / np.abs(values).max())
     studio.show(obj, "Mode")

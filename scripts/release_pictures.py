@@ -45,7 +45,7 @@ def icon(path):
 def featured(path):
     """From points to the curvature of their surface and to a mode of it, under the name of the extension."""
     points = demo.Coral().sample(demo.POINTS)
-    kept = studio.part("core").thin_out(points, count=SHOWN)
+    kept = studio.part("core").clean.thin_out(points, count=SHOWN)
     raw, curved, waving = (
         studio.make_object(part, name)
         for part, name in ((points[kept], "Points"), (points, "Curvature"), (points, "Mode"))

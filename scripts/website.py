@@ -115,7 +115,7 @@ def api():
             seen.add(home)
             # Where a module has the name of what is in it, griffe finds the module by the short name.
             called = f"{package.path}.{name}"
-            found.setdefault(_package(core, home), {})[called] = home if thing.parent.name == name else called
+            found.setdefault(package.path, {})[called] = home if thing.parent.name == name else called
     return found
 
 
@@ -130,12 +130,6 @@ def _home(core, path):
     module = core if parent == NAME else core.modules_collection.get_member(parent) if parent.startswith(NAME) else None
     listed = module.imports.get(name, path) if module else path
     return path if listed == path else _home(core, listed)
-
-
-def _package(core, home):
-    """Return the public package in which something is defined, core where there is none."""
-    package = core[home.split(".")[1]]
-    return package.path if package.is_init_module and package.name not in INNER else NAME
 
 
 def _place(package):
@@ -155,7 +149,7 @@ def _links(before, names, topic):
 def _link(name, topic, shown, kind=""):
     """Return a reference to what a text about a package calls so, or to a method of it; None if there is no such."""
     paths = {called: path for things in api().values() for called, path in things.items()}
-    first, _, method = name.partition(".")
+    first, _, method = name.rpartition(".")
     for called, rest in ((name, ""), (f"{topic}.{name}", ""), (first, method), (f"{topic}.{first}", method)):
         if path := paths.get(f"{NAME}.{called}"):
             return f'<autoref identifier="{f"{path}.{rest}".rstrip(".")}"{kind}>{shown}</autoref>'

@@ -36,9 +36,9 @@ laplacian = core.build_laplacian(points)
 axes = ellipsoids.quaternions_of(np.moveaxis(frames(laplacian.normals)[:, :, ::-1], 0, 2))  # tangents and normal
 size = np.sqrt(laplacian.areas)[:, None] * [0.6, 0.6, 0.05]
 colors = 1.6 * np.sin(points @ np.array([[2.0, 1.0, 0.0], [0.0, 2.0, 1.0], [1.0, 0.0, 2.0]]))
-given = core.Splats(points, size, axes, np.full(len(points), 0.95), colors, np.zeros((len(points), 0, 3)))
+given = core.splats.Splats(points, size, axes, np.full(len(points), 0.95), colors, np.zeros((len(points), 0, 3)))
 with TemporaryDirectory() as folder:
-    core.write_splats(Path(folder) / "Coral.ply", given)
+    core.splats.write_splats(Path(folder) / "Coral.ply", given)
     bpy.ops.meshfree.import_points(filepath=str(Path(folder) / "Coral.ply"), up="Z")
 view = view3d()[0].spaces.active
 view.region_3d.view_rotation = Euler((1.35, 0.0, 0.3)).to_quaternion()

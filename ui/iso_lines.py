@@ -55,7 +55,7 @@ class MESHFREE_OT_iso_lines_to_curves(ApplicationOperator, bpy.types.Operator):
 
         def compute(progress):
             vertices, faces, carried = surface(progress)
-            lines = core.iso_lines(vertices, faces, carried, levels)
+            lines = core.measure.iso_lines(vertices, faces, carried, levels)
             if not lines:
                 raise core.PointCloudError(
                     f"{label(name)} has no lines at {count} values from {levels[0]:g} to {levels[-1]:g}. Extend"

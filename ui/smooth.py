@@ -75,7 +75,7 @@ def _slopes(points, discs, spacing):
     normals = np.divide(
         discs, radii[:, None], out=np.tile([0.0, 0.0, 1.0], (len(discs), 1)), where=radii[:, None] > 0.0
     )
-    return core.Slopes(points, core.Discs(normals, radii.astype(np.float64) * spacing))
+    return core.measure.Slopes(points, core.surface.Discs(normals, radii.astype(np.float64) * spacing))
 
 
 def _as_number(values):

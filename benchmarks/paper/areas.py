@@ -118,7 +118,7 @@ def figure_14():
     points = open_cylinder()
     fixed = np.abs(points[:, 2]) > 1.0 - 1e-9
     began = time.perf_counter()
-    film = core.minimal_surface(points, fixed, epsilon=1e-4)
+    film = core.deform.minimal_surface(points, fixed, epsilon=1e-4)
     seconds = time.perf_counter() - began
     exact = catenoid()[1]
     history = list(film.area_history)

@@ -157,7 +157,7 @@ class Ours(Operator):
 
     def solve_poisson(self, source):
         """Solve ``-L u = source``, both without their mean."""
-        return core.solve_poisson(self.laplacian, source - self.areas @ source / self.areas.sum())
+        return core.distance.solve_poisson(self.laplacian, source - self.areas @ source / self.areas.sum())
 
 
 def factors(matrix):

@@ -12,7 +12,7 @@ from .chebyshev import (
 )
 from .cholesky import factorize
 from .davidson import coarse_to_fine
-from .dense import eliminate, inverses
+from .dense import eliminate, inverses, lifted_inverse
 from .eigenvalue import largest_eigenvalue
 from .factors import dissect, sparsify
 from .lanczos import lift_lowest

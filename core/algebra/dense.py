@@ -94,3 +94,16 @@ def eliminate(equations: Floats) -> Floats:
                 entries[pivot] = 0.0
                 entries -= column[other] * row
     return equations
+
+
+def lifted_inverse(matrices: Floats, least: float) -> Floats:
+    """Return the inverses of symmetric matrices, (2, 2, m), semi-definite.
+
+    Both eigenvalues are raised alike where the smaller one is below a share of the trace, ``least``.
+    """
+    (a, b), (_, d) = matrices
+    trace = a + d
+    smaller = 0.5 * (trace - np.hypot(a - d, 2.0 * b))
+    lifted = np.where(trace > 0.0, np.maximum(least * trace - smaller, 0.0), 1.0)
+    a, d = a + lifted, d + lifted
+    return np.array([[d, -b], [-b, a]]) / (a * d - b * b)

@@ -1,5 +1,7 @@
 """Fewer, smoother and better points."""
 
+from ..geometry import Prolongation as Prolongation
+from ..geometry import blue_noise_subset as blue_noise_subset
 from .cleaning import clean_points as clean_points
 from .filters import band as band
 from .filters import boost as boost

@@ -65,7 +65,7 @@ def clean_points(
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> noisy = points * np.random.default_rng(0).normal(1, 0.02, (800, 1))
-    >>> clean = mf.clean_points(mf.build_laplacian(noisy))
+    >>> clean = mf.clean.clean_points(mf.build_laplacian(noisy))
     >>> print(np.linalg.norm(clean, axis=1).std() < 0.007)
     True
     """

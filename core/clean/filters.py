@@ -197,7 +197,7 @@ def spectral_filter(
     >>> z = points[:, 2]
     >>> laplacian = mf.build_laplacian(points)
     >>> values = z + points[:, 0] * points[:, 1]
-    >>> smooth = mf.spectral_filter(values, laplacian.eigenpairs(9), laplacian.areas, 4)
+    >>> smooth = mf.clean.spectral_filter(values, laplacian.eigenpairs(9), laplacian.areas, 4)
     >>> print(np.abs(smooth - z).max().round(2))
     0.0
     """

@@ -104,10 +104,10 @@ def smooth_points(
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> laplacian = mf.build_laplacian(points)
-    >>> smaller = mf.smooth_points(laplacian, mf.exponential(0.1))
+    >>> smaller = mf.clean.smooth_points(laplacian, mf.clean.exponential(0.1))
     >>> print(np.linalg.norm(smaller, axis=1).mean().round(2))
     0.82
-    >>> same = mf.smooth_points(laplacian, mf.exponential(0.1), keep="area")
+    >>> same = mf.clean.smooth_points(laplacian, mf.clean.exponential(0.1), keep="area")
     >>> print(np.linalg.norm(same, axis=1).mean().round(2))
     1.0
     """
@@ -201,7 +201,7 @@ def fair_points(
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> noisy = points * np.random.default_rng(0).normal(1, 0.02, (800, 1))
-    >>> smooth = mf.fair_points(mf.build_laplacian(noisy))
+    >>> smooth = mf.clean.fair_points(mf.build_laplacian(noisy))
     >>> print(np.linalg.norm(noisy, axis=1).std().round(3), np.linalg.norm(smooth, axis=1).std().round(3))
     0.02 0.005
     """
@@ -250,7 +250,7 @@ def roughness(
     See Also
     --------
     fair_points : Computes the smoothed surface.
-    principal_curvatures : Curvature of the surface itself.
+    measure.principal_curvatures : Curvature of the surface itself.
 
     Examples
     --------
@@ -260,7 +260,7 @@ def roughness(
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> points[400] *= 1.02
-    >>> rough = mf.roughness(mf.build_laplacian(points))
+    >>> rough = mf.clean.roughness(mf.build_laplacian(points))
     >>> print(np.argmax(np.abs(rough)), rough[400].round(2))
     400 0.02
     """
@@ -309,7 +309,7 @@ def displace_by_mode(
     See Also
     --------
     LaplaceBeltrami.eigenpairs : Computes modes.
-    nodal_domains : Where a mode keeps its sign.
+    spectral.nodal_domains : Where a mode keeps its sign.
 
     Examples
     --------
@@ -320,7 +320,7 @@ def displace_by_mode(
     >>> points = mf.example_sphere()
     >>> z = points[:, 2]
     >>> laplacian = mf.build_laplacian(points)
-    >>> moved = mf.displace_by_mode(laplacian, z, 0.2)
+    >>> moved = mf.clean.displace_by_mode(laplacian, z, 0.2)
     >>> print(moved[:, 2].min().round(1), moved[:, 2].max().round(1))
     -0.8 1.2
     """

@@ -58,7 +58,7 @@ class Strays:
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> strays = mf.Strays(np.concatenate([points, [[0.0, 0.0, 1.5]]]))
+    >>> strays = mf.clean.Strays(np.concatenate([points, [[0.0, 0.0, 1.5]]]))
     >>> print(np.flatnonzero(strays.chosen()), strays.scores[800] > 2.0, strays.part_counts[0])
     [800] True 800
     """
@@ -163,7 +163,7 @@ def stray_points(
     See Also
     --------
     Strays : Measures once, for any strictness.
-    floaters : The same for Gaussian splats.
+    splats.floaters : The same for Gaussian splats.
     build_laplacian : Leaves stray points out by itself.
 
     Notes
@@ -185,7 +185,7 @@ def stray_points(
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> cloud = np.concatenate([points, 1.4 * points[::100]])
-    >>> print(np.flatnonzero(mf.stray_points(cloud)))
+    >>> print(np.flatnonzero(mf.clean.stray_points(cloud)))
     [800 801 802 803 804 805 806 807]
     """
     return Strays(points, progress=progress).chosen(strictness, smallest=smallest, smallest_area=smallest_area)

@@ -76,9 +76,9 @@ def thin_out(
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> few = points[mf.thin_out(points, spacing=0.3)]
+    >>> few = points[mf.clean.thin_out(points, spacing=0.3)]
     >>> apart = np.linalg.norm(few[:, None] - few, axis=2) + 9.0 * np.eye(len(few))
-    >>> print(apart.min() >= 0.3, len(mf.thin_out(points, count=100)) <= 100)
+    >>> print(apart.min() >= 0.3, len(mf.clean.thin_out(points, count=100)) <= 100)
     True True
     """
     report = progress or (lambda stage, fraction: None)

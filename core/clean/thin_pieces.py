@@ -57,7 +57,7 @@ def thin_pieces(pieces: Iterable[Piece], count: int, *, progress: Report | None 
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> pieces = [(piece, {}) for piece in np.split(points, [300])]
-    >>> few = mf.thin_pieces(pieces, 100)
+    >>> few = mf.clean.thin_pieces(pieces, 100)
     >>> print(90 <= sum(len(chosen) for chosen, numbers in few) <= 100)
     True
     """

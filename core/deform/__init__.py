@@ -5,6 +5,5 @@ from .coarse_deformation import coarse_deformer as coarse_deformer
 from .deformation import Deformation as Deformation
 from .deformation import Deformer as Deformer
 from .gradients import deformation_gradients as deformation_gradients
-from .gradients import lifted_inverse as lifted_inverse
 from .minimal_surface import MinimalSurface as MinimalSurface
 from .minimal_surface import minimal_surface as minimal_surface

@@ -77,7 +77,7 @@ class CoarseDeformer(HandleSolver):
     >>> points = mf.example_sphere()
     >>> z = points[:, 2]
     >>> laplacian = mf.build_laplacian(points)
-    >>> deformer = mf.CoarseDeformer(laplacian, z > 0.8, z < -0.8, count=400)
+    >>> deformer = mf.deform.CoarseDeformer(laplacian, z > 0.8, z < -0.8, count=400)
     >>> moved = deformer.solve(points[deformer.handles] + [0, 0, 1])
     >>> print((moved - points)[[0, 799], 2].round(2), (moved - points)[:, 2].mean().round(1))
     [1. 0.] 0.5

@@ -174,8 +174,8 @@ class Deformer(HandleSolver):
 
     See Also
     --------
-    grow : Chooses the points around others.
-    smooth_points : Filters the shape.
+    distance.grow : Chooses the points around others.
+    clean.smooth_points : Filters the shape.
 
     Notes
     -----
@@ -202,7 +202,7 @@ class Deformer(HandleSolver):
     >>> points = mf.example_sphere()
     >>> z = points[:, 2]
     >>> laplacian = mf.build_laplacian(points)
-    >>> deformer = mf.Deformer(laplacian, z > 0.8, z < -0.8)
+    >>> deformer = mf.deform.Deformer(laplacian, z > 0.8, z < -0.8)
     >>> moved = deformer.solve(points[deformer.handles] + [0, 0, 1])
     >>> print((moved - points)[[0, 799], 2].round(2), (moved - points)[:, 2].mean().round(2))
     [1. 0.] 0.5

@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from ..algebra import rotations_in_groups
+from ..algebra import lifted_inverse, rotations_in_groups
 from ..arguments import check_positions
 from ..geometry import frames
 from ..operator import LaplaceBeltrami
@@ -64,7 +64,7 @@ class DeformationGradients:
         tangents = self._tangents
         left = np.einsum("abn,bcn->acn", after - np.einsum("abn,bcn->acn", alike, before), tangents)
         inner = np.einsum("abn,bdn->adn", np.einsum("ban,bcn->acn", tangents, before), tangents)
-        slopes = np.einsum("abn,bcn->acn", left, lifted_inverse(inner))
+        slopes = np.einsum("abn,bcn->acn", left, lifted_inverse(inner, _ROUND))
         stretched = np.einsum("abn,bcn->acn", alike, tangents) + slopes
         across = np.cross(stretched[:, 1], stretched[:, 0], axis=0)  # as `frames` orders them
         area = np.sqrt(np.einsum("an,an->n", across, across))
@@ -98,7 +98,7 @@ def deformation_gradients(laplacian: LaplaceBeltrami, positions: ArrayLike) -> F
     See Also
     --------
     Deformer : Deforms a surface by its handles.
-    Splats.deformed : Deforms ellipsoids.
+    splats.Splats.deformed : Deforms ellipsoids.
 
     Notes
     -----
@@ -116,7 +116,7 @@ def deformation_gradients(laplacian: LaplaceBeltrami, positions: ArrayLike) -> F
     >>> points = mf.example_sphere()
     >>> z = points[:, 2]
     >>> laplacian = mf.build_laplacian(points)
-    >>> gradients = mf.deformation_gradients(laplacian, points * [1, 1, 2])
+    >>> gradients = mf.deform.deformation_gradients(laplacian, points * [1, 1, 2])
     >>> print(np.median(gradients[abs(z) < 0.05, 2, 2]).round(1))
     2.0
     """
@@ -169,13 +169,3 @@ def step_products(weights: sparse.coo_array, rest: Floats) -> sparse.csr_array:
         own = np.bincount(weights.row, share, minlength=len(rest))
         products.append(product - sparse.diags_array(own, format="csr"))
     return sparse.vstack(products, format="csr")
-
-
-def lifted_inverse(matrices: Floats, least: float = _ROUND) -> Floats:
-    """Return the inverses of symmetric matrices, (2, 2, m), regularized where steps lie in a row."""
-    (a, b), (_, d) = matrices
-    trace = a + d
-    smaller = 0.5 * (trace - np.hypot(a - d, 2.0 * b))
-    lifted = np.where(trace > 0.0, np.maximum(least * trace - smaller, 0.0), 1.0)
-    a, d = a + lifted, d + lifted
-    return np.array([[d, -b], [-b, a]]) / (a * d - b * b)

@@ -120,8 +120,8 @@ def minimal_surface(
     See Also
     --------
     MinimalSurface : The result.
-    mean_curvature : Zero on it, but at fixed points.
-    fair_points : Smooths noise.
+    measure.mean_curvature : Zero on it, but at fixed points.
+    clean.fair_points : Smooths noise.
 
     Notes
     -----
@@ -163,7 +163,7 @@ def minimal_surface(
     >>> import meshfree_laplacian as mf
     >>> x, y = np.mgrid[-1:1:21j, -1:1:21j].reshape(2, -1)
     >>> points = np.column_stack([x, y, 0.5 * (1 - x**2) * (1 - y**2)])
-    >>> film = mf.minimal_surface(points, np.maximum(np.abs(x), np.abs(y)) == 1)
+    >>> film = mf.deform.minimal_surface(points, np.maximum(np.abs(x), np.abs(y)) == 1)
     >>> print(film.converged, round(film.initial_area, 1), film.areas.sum().round(1))
     True 4.6 4.0
     """

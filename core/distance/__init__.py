@@ -1,4 +1,4 @@
-"""Distances, paths and directions along a surface."""
+"""Distances, paths and directions along a surface, and functions between given values."""
 
 from .falloff import falloff as falloff
 from .fields import harmonic_field as harmonic_field

@@ -56,8 +56,8 @@ def falloff(distance: ArrayLike, radius: float, shape: str = "smooth") -> Floats
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> distance = mf.geodesic_distance(mf.build_laplacian(points), [0])
-    >>> weights = mf.falloff(distance, np.pi / 2)
+    >>> distance = mf.distance.geodesic_distance(mf.build_laplacian(points), [0])
+    >>> weights = mf.distance.falloff(distance, np.pi / 2)
     >>> print(weights[[0, 400, 799]].round(1))
     [1. 0. 0.]
     """

@@ -91,7 +91,7 @@ def solve_poisson(
     >>> points = mf.example_sphere()
     >>> z = points[:, 2]
     >>> laplacian = mf.build_laplacian(points)
-    >>> solution = mf.solve_poisson(laplacian, 2 * z)
+    >>> solution = mf.distance.solve_poisson(laplacian, 2 * z)
     >>> print(np.abs(solution - z).max().round(2))
     0.0
     """
@@ -177,7 +177,7 @@ def harmonic_field(
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> laplacian = mf.build_laplacian(points)
-    >>> field = mf.harmonic_field(laplacian, [0, 799], [1, -1])
+    >>> field = mf.distance.harmonic_field(laplacian, [0, 799], [1, -1])
     >>> print(field[[0, 400, 799]].round(1))
     [ 1.  0. -1.]
     """

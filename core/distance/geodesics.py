@@ -80,7 +80,7 @@ def geodesic_distance(laplacian: LaplaceBeltrami, sources: ArrayLike, *, progres
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> laplacian = mf.build_laplacian(points)
-    >>> distance = mf.geodesic_distance(laplacian, [0])
+    >>> distance = mf.distance.geodesic_distance(laplacian, [0])
     >>> print(distance.max().round(1), np.arccos((points @ points[0]).min()).round(1))
     3.1 3.1
     """
@@ -109,7 +109,7 @@ class Geodesics:
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> geodesics = mf.Geodesics(mf.build_laplacian(points))
+    >>> geodesics = mf.distance.Geodesics(mf.build_laplacian(points))
     >>> print(*(geodesics.distance([pole])[400].round(1) for pole in (0, 799)))
     1.6 1.6
     """
@@ -388,7 +388,7 @@ def nearest_source(laplacian: LaplaceBeltrami, sources: ArrayLike, *, progress: 
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> z = points[:, 2]
-    >>> label = mf.nearest_source(mf.build_laplacian(points), [0, 799])
+    >>> label = mf.distance.nearest_source(mf.build_laplacian(points), [0, 799])
     >>> print(label[z > 0.1].max(), label[z < -0.1].min())
     0 1
     """
@@ -441,7 +441,7 @@ def signed_distance(
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> distance = mf.signed_distance(mf.build_laplacian(points), [100, 101, 102], closed=True)
+    >>> distance = mf.distance.signed_distance(mf.build_laplacian(points), [100, 101, 102], closed=True)
     >>> print(np.sign(distance[0] * distance[799]))
     -1.0
     """

@@ -77,8 +77,8 @@ def geodesic_path(
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> path = mf.geodesic_path(mf.build_laplacian(points), 0, 799)
-    >>> print((mf.polygon_length(path) / np.arccos(points[0] @ points[799])).round(2))
+    >>> path = mf.distance.geodesic_path(mf.build_laplacian(points), 0, 799)
+    >>> print((mf.distance.polygon_length(path) / np.arccos(points[0] @ points[799])).round(2))
     1.0
     """
     report = progress or (lambda stage, fraction: None)
@@ -122,7 +122,7 @@ def polygon_length(corners: ArrayLike) -> float:
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> print(round(mf.polygon_length(points[[0, 799]]), 1))
+    >>> print(round(mf.distance.polygon_length(points[[0, 799]]), 1))
     2.0
     """
     advice = "Give x, y, z of each corner."

@@ -42,7 +42,7 @@ def grow(laplacian: LaplaceBeltrami, chosen: ArrayLike, distance: float) -> Bool
     See Also
     --------
     geodesic_distance : The distances themselves.
-    segment : Sets of points found by shape.
+    spectral.segment : Sets of points found by shape.
 
     Examples
     --------
@@ -52,7 +52,7 @@ def grow(laplacian: LaplaceBeltrami, chosen: ArrayLike, distance: float) -> Bool
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> laplacian = mf.build_laplacian(points)
-    >>> print(mf.grow(laplacian, [0], np.pi / 3).mean().round(2))
+    >>> print(mf.distance.grow(laplacian, [0], np.pi / 3).mean().round(2))
     0.25
     """
     mask = as_mask(chosen, len(laplacian.points))
@@ -100,7 +100,7 @@ def front_point(points: ArrayLike, eye: ArrayLike, direction: ArrayLike, reach: 
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> seen = mf.front_point(points, eye=[0, 0, 5], direction=[0, 0, -1], reach=0.25)
+    >>> seen = mf.distance.front_point(points, eye=[0, 0, 5], direction=[0, 0, -1], reach=0.25)
     >>> print(points[seen, 2].round(1))
     1.0
     """
@@ -151,7 +151,7 @@ def opposite_ends(laplacian: LaplaceBeltrami, share: float = 0.03) -> tuple[Ints
     See Also
     --------
     grow : Adds points within a distance to a set.
-    Deformer : Moves one end while the other stays.
+    deform.Deformer : Moves one end while the other stays.
 
     Examples
     --------
@@ -161,7 +161,7 @@ def opposite_ends(laplacian: LaplaceBeltrami, share: float = 0.03) -> tuple[Ints
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> laplacian = mf.build_laplacian(points)
-    >>> one, other = mf.opposite_ends(laplacian, share=0.05)
+    >>> one, other = mf.distance.opposite_ends(laplacian, share=0.05)
     >>> print((points[one].mean(axis=0) @ points[other].mean(axis=0)).round(1))
     -0.9
     """

@@ -63,7 +63,7 @@ def transport(
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> laplacian = mf.build_laplacian(points)
-    >>> direction = mf.transport(laplacian, [0], [1, 0, 0])
+    >>> direction = mf.distance.transport(laplacian, [0], [1, 0, 0])
     >>> ahead = np.argmax(points[:, 0])
     >>> print(np.abs(direction[ahead, 2]).round(1))
     1.0
@@ -103,7 +103,7 @@ class Transport:
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> field = mf.Transport(mf.build_laplacian(points))
+    >>> field = mf.distance.Transport(mf.build_laplacian(points))
     >>> print(np.abs(field.extend([0], [1, 0, 0]) + field.extend([0], [-1, 0, 0])).max().round(6))
     0.0
     """
@@ -266,7 +266,7 @@ def logarithmic_map(
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> place = mf.logarithmic_map(mf.build_laplacian(points), 0)
+    >>> place = mf.distance.logarithmic_map(mf.build_laplacian(points), 0)
     >>> print(place[0], np.hypot(*place.T).max().round(1))
     [0. 0.] 3.1
     """

@@ -624,7 +624,7 @@ def estimate_normals(points: ArrayLike, options: LaplacianOptions = LaplacianOpt
     See Also
     --------
     build_laplacian : The operator, whose ``normals`` these are.
-    mean_curvature : Half their divergence.
+    measure.mean_curvature : Half their divergence.
 
     Examples
     --------
@@ -643,7 +643,7 @@ def estimate_normals(points: ArrayLike, options: LaplacianOptions = LaplacianOpt
 
 @dataclass(frozen=True, eq=False)
 class Discs(Frozen):
-    """Discs in the tangent planes of points, made by `surface_discs`.
+    """Discs in the tangent planes of points, made by `surface.surface_discs`.
 
     Attributes
     ----------
@@ -663,7 +663,7 @@ class Discs(Frozen):
         Parameters
         ----------
         gradients : ndarray, (n, 3, 3)
-            Its linear map around each point, of `deformation_gradients` or any other.
+            Its linear map around each point, of `deform.deformation_gradients` or any other.
 
         Returns
         -------
@@ -712,7 +712,7 @@ def surface_discs(points: ArrayLike, *, progress: Progress | None = None) -> Dis
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> discs = mf.surface_discs(points)
+    >>> discs = mf.surface.surface_discs(points)
     >>> print(discs.radii.mean().round(2), np.abs(discs.normals - points).max().round(2))
     0.08 0.0
     """

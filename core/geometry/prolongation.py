@@ -56,16 +56,16 @@ class Prolongation:
 
     See Also
     --------
-    blue_noise_subset : Chooses a subset.
+    clean.blue_noise_subset : Chooses a subset.
 
     Examples
     --------
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> subset = mf.blue_noise_subset(points, 300)
+    >>> subset = mf.clean.blue_noise_subset(points, 300)
     >>> laplacian = mf.build_laplacian(points[subset])
-    >>> every = mf.Prolongation(points, subset, laplacian.normals)
+    >>> every = mf.clean.Prolongation(points, subset, laplacian.normals)
     >>> print(np.isclose(every.shares(laplacian.areas).sum(), laplacian.areas.sum()))
     True
     >>> print(np.abs(every.interpolate(points[subset, 2]) - points[:, 2]).max() < 0.03)

@@ -52,14 +52,14 @@ def blue_noise_subset(points: ArrayLike, count: int, *, progress: Report | None 
 
     See Also
     --------
-    Prolongation : Carries what was computed there to all points.
+    clean.Prolongation : Carries what was computed there to all points.
 
     Examples
     --------
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> print(180 <= len(mf.blue_noise_subset(points, 200)) <= 200)
+    >>> print(180 <= len(mf.clean.blue_noise_subset(points, 200)) <= 200)
     True
     """
     report = progress or (lambda: None)

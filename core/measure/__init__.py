@@ -1,5 +1,10 @@
-"""Areas, lengths, volumes, sections and slopes of a surface."""
+"""Curvature, areas, lengths, volumes, sections and slopes of a surface, and one cloud on or beside another."""
 
+from ..operator import MeanCurvature as MeanCurvature
+from ..operator import PrincipalCurvatures as PrincipalCurvatures
+from ..operator import mean_curvature as mean_curvature
+from ..operator import measure_mean_curvature as measure_mean_curvature
+from ..operator import principal_curvatures as principal_curvatures
 from .alignment import Alignment as Alignment
 from .alignment import align as align
 from .alignment import match_places as match_places

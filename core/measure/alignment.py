@@ -149,7 +149,7 @@ def align(
     >>> body = points * [1.0, 0.7, 0.5]
     >>> cosine, sine = np.cos(np.radians(10.0)), np.sin(np.radians(10.0))
     >>> moved = body @ [[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]] + [0.1, 0.0, 0.05]
-    >>> found = mf.align(moved, body)
+    >>> found = mf.measure.align(moved, body)
     >>> print(found.converged, np.allclose(moved @ found.matrix[:3, :3].T + found.matrix[:3, 3], body))
     True True
     """
@@ -210,7 +210,7 @@ def match_places(places: ArrayLike, others: ArrayLike, *, scale: bool = False) -
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> matrix = mf.match_places(points[:3], points[:3] + [2.0, 0.0, 0.0])
+    >>> matrix = mf.measure.match_places(points[:3], points[:3] + [2.0, 0.0, 0.0])
     >>> print(np.allclose(matrix[:3, 3], [2.0, 0.0, 0.0]), np.allclose(matrix[:3, :3], np.eye(3)))
     True True
     """

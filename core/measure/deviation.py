@@ -38,9 +38,9 @@ class Deviation(NamedTuple):
 
 @ends_at_one
 def surface_deviation(
+    laplacian: LaplaceBeltrami,
     points: ArrayLike,
     normals: ArrayLike | None,
-    laplacian: LaplaceBeltrami,
     greatest: float | None = None,
     *,
     progress: Progress | None = None,
@@ -53,12 +53,12 @@ def surface_deviation(
 
     Parameters
     ----------
+    laplacian : LaplaceBeltrami
+        Of the other cloud.
     points : array_like, (n, 3)
-        Coordinates [L].
+        Coordinates [L], the same as its own.
     normals : array_like, (n, 3), or None
         Normals of any length; their signs decide those of the distances. None for distances without signs.
-    laplacian : LaplaceBeltrami
-        Of the other cloud, in the same coordinates.
     greatest : float, optional
         Distance [L] beyond which points are not compared; any if not given.
     progress : callable, optional
@@ -78,7 +78,7 @@ def surface_deviation(
     See Also
     --------
     outer_sides : Tells where signs of normals are known.
-    mesh_surface : Makes a mesh of that surface.
+    surface.mesh_surface : Makes a mesh of that surface.
 
     References
     ----------
@@ -91,10 +91,10 @@ def surface_deviation(
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> deviation = mf.surface_deviation(1.1 * points[::2], points[::2], mf.build_laplacian(points))
+    >>> deviation = mf.measure.surface_deviation(mf.build_laplacian(points), 1.1 * points[::2], points[::2])
     >>> print(np.allclose(deviation.distance, 0.1, atol=1e-3), deviation.known.all())
     True True
-    >>> inside = mf.surface_deviation(0.9 * points[::2], None, mf.build_laplacian(points))
+    >>> inside = mf.measure.surface_deviation(mf.build_laplacian(points), 0.9 * points[::2], None)
     >>> print(np.allclose(inside.distance, 0.1, atol=1e-3))
     True
     """
@@ -145,11 +145,11 @@ def outer_sides(laplacian: LaplaceBeltrami) -> Floats:
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> print(mf.outer_sides(mf.build_laplacian(points)).min())
+    >>> print(mf.measure.outer_sides(mf.build_laplacian(points)).min())
     1.0
     >>> wall = np.zeros((400, 3))
     >>> wall[:, ::2] = np.random.default_rng(0).random((400, 2))
-    >>> print(np.abs(mf.outer_sides(mf.build_laplacian(wall))).max())
+    >>> print(np.abs(mf.measure.outer_sides(mf.build_laplacian(wall))).max())
     0.0
     """
     kept = np.flatnonzero(laplacian.component >= 0)
@@ -190,8 +190,8 @@ def sides_beside(laplacian: LaplaceBeltrami, sides: ArrayLike, points: ArrayLike
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> laplacian = mf.build_laplacian(points)
-    >>> sides = mf.outer_sides(laplacian)
-    >>> print(mf.sides_beside(laplacian, sides, [[0, 0, 1.5], [0, 0, -1.5]], np.tile([0, 0, 1], (2, 1))))
+    >>> sides = mf.measure.outer_sides(laplacian)
+    >>> print(mf.measure.sides_beside(laplacian, sides, [[0, 0, 1.5], [0, 0, -1.5]], np.tile([0, 0, 1], (2, 1))))
     [ 1. -1.]
     """
     points = check_points(points)

@@ -56,8 +56,8 @@ def iso_lines(vertices: ArrayLike, faces: ArrayLike, values: ArrayLike, levels: 
 
     See Also
     --------
-    mesh_surface : Makes a mesh.
-    values_on_mesh : Carries values to its vertices.
+    surface.mesh_surface : Makes a mesh.
+    surface.values_on_mesh : Carries values to its vertices.
 
     Examples
     --------
@@ -66,8 +66,8 @@ def iso_lines(vertices: ArrayLike, faces: ArrayLike, values: ArrayLike, levels: 
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> mesh = mf.mesh_surface(mf.build_laplacian(points))
-    >>> (circle,) = mf.iso_lines(mesh.vertices, mesh.faces, mesh.vertices[:, 2], [0.5])
+    >>> mesh = mf.surface.mesh_surface(mf.build_laplacian(points))
+    >>> (circle,) = mf.measure.iso_lines(mesh.vertices, mesh.faces, mesh.vertices[:, 2], [0.5])
     >>> steps = circle.points - np.roll(circle.points, 1, axis=0)
     >>> print(circle.closed, (np.linalg.norm(steps, axis=1).sum() / (np.pi * np.sqrt(3))).round(2))
     True 1.0

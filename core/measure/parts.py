@@ -50,7 +50,7 @@ def measure_parts(
     laplacian : LaplaceBeltrami
         Of n points.
     labels : array_like, (n,) int, optional
-        The part of each point, such as those of `segment`; below zero for none. Without them the parts are the
+        The part of each point, such as those of `spectral.segment`; below zero for none. Without them the parts are the
         components.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
@@ -87,7 +87,7 @@ def measure_parts(
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> found = mf.measure_parts(mf.build_laplacian(points), (points[:, 2] > 0).astype(int))
+    >>> found = mf.measure.measure_parts(mf.build_laplacian(points), (points[:, 2] > 0).astype(int))
     >>> print((found.areas / np.pi).round(1), found.points)
     [2. 2.] [400 400]
     """
@@ -140,7 +140,7 @@ def part_means(laplacian: LaplaceBeltrami, values: ArrayLike, labels: ArrayLike 
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> print(mf.part_means(mf.build_laplacian(points), points[:, 2] ** 2)[0].round(2))
+    >>> print(mf.measure.part_means(mf.build_laplacian(points), points[:, 2] ** 2)[0].round(2))
     [0.33]
     """
     count = len(laplacian.points)

@@ -99,10 +99,10 @@ def pile_volume(
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> laplacian = mf.build_laplacian(points)
-    >>> found = mf.pile_volume(laplacian, points[:, 2] > 0)
+    >>> found = mf.measure.pile_volume(laplacian, points[:, 2] > 0)
     >>> print(round(found.above, 1), found.below < 0.1)
     2.1 True
-    >>> found = mf.pile_volume(laplacian, points[:, 2] > 0, plane=([0, 0, -1], [0, 0, 1]))
+    >>> found = mf.measure.pile_volume(laplacian, points[:, 2] > 0, plane=([0, 0, -1], [0, 0, 1]))
     >>> print(round(found.above, 1), found.below)
     5.2 0.0
     """

@@ -43,7 +43,7 @@ def profile(laplacian: LaplaceBeltrami, path: ArrayLike, values: ArrayLike) -> P
     laplacian : LaplaceBeltrami
         Of n points.
     path : array_like, (k, 3)
-        Corners on or near the surface in their order [L], such as those of `geodesic_path` or of a section.
+        Corners on or near the surface in their order [L], such as those of `distance.geodesic_path` or of a section.
     values : array_like, (n,) or (n, m)
         The function at the points; those that are not finite are unknown.
 
@@ -59,9 +59,9 @@ def profile(laplacian: LaplaceBeltrami, path: ArrayLike, values: ArrayLike) -> P
 
     See Also
     --------
-    geodesic_path : Finds the shortest path between two points.
+    distance.geodesic_path : Finds the shortest path between two points.
     cross_section : Finds the curves in a plane.
-    values_on_mesh : Interpolates at any places on the surface.
+    surface.values_on_mesh : Interpolates at any places on the surface.
 
     Notes
     -----
@@ -77,8 +77,8 @@ def profile(laplacian: LaplaceBeltrami, path: ArrayLike, values: ArrayLike) -> P
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> laplacian = mf.build_laplacian(points)
-    >>> path = mf.geodesic_path(laplacian, 0, 400)
-    >>> found = mf.profile(laplacian, path, points[:, 2])
+    >>> path = mf.distance.geodesic_path(laplacian, 0, 400)
+    >>> found = mf.measure.profile(laplacian, path, points[:, 2])
     >>> print(np.abs(found.values - path[:, 2]).max() < 0.02)
     True
     """

@@ -119,8 +119,8 @@ class SurfaceMeasures:
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> laplacian = mf.build_laplacian(points)
-    >>> measures = mf.SurfaceMeasures(laplacian)
-    >>> halves = [mf.measure_region(laplacian, side * points[:, 2] > 0, measures=measures) for side in (1, -1)]
+    >>> measures = mf.measure.SurfaceMeasures(laplacian)
+    >>> halves = [mf.measure.measure_region(laplacian, side * points[:, 2] > 0, measures=measures) for side in (1, -1)]
     >>> print([round(half.area / np.pi, 1) for half in halves])
     [2.0, 2.0]
     """
@@ -217,7 +217,7 @@ def measure_region(
     See Also
     --------
     enclosed_volume : The volume within a surface.
-    grow : Finds the points within a distance.
+    distance.grow : Finds the points within a distance.
 
     Notes
     -----
@@ -235,7 +235,7 @@ def measure_region(
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> found = mf.measure_region(mf.build_laplacian(points), points[:, 2] > 0)
+    >>> found = mf.measure.measure_region(mf.build_laplacian(points), points[:, 2] > 0)
     >>> print(round(found.area / np.pi, 1), round(found.boundary_length / np.pi, 1))
     2.0 2.0
     """

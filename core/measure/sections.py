@@ -124,7 +124,7 @@ def cross_section(
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> found = mf.cross_section(mf.build_laplacian(points), [0, 0, 0.5], [0, 0, 1])
+    >>> found = mf.measure.cross_section(mf.build_laplacian(points), [0, 0, 0.5], [0, 0, 1])
     >>> print(len(found.curves), round(found.enclosed_area / np.pi, 2))
     1 0.75
     """

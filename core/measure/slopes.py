@@ -4,10 +4,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from ..algebra import blocks, on_all_cores
+from ..algebra import blocks, lifted_inverse, on_all_cores
 from ..arguments import as_array, as_doubles, check_array, check_positions
 from ..cores import cores
-from ..deform import lifted_inverse
 from ..geometry import Discs, frames
 from ..types import Floats
 
@@ -36,7 +35,7 @@ class Slopes:
 
     See Also
     --------
-    surface_discs : Finds the discs.
+    surface.surface_discs : Finds the discs.
 
     Notes
     -----
@@ -54,7 +53,7 @@ class Slopes:
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> z = points[:, 2]
-    >>> slopes = mf.Slopes(points, mf.surface_discs(points)).of(z)
+    >>> slopes = mf.measure.Slopes(points, mf.surface.surface_discs(points)).of(z)
     >>> print(slopes[abs(z) < 0.1].mean(axis=0).round(1) + 0.0)
     [0. 0. 1.]
     """

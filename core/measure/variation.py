@@ -26,7 +26,7 @@ def surface_variation(laplacian: LaplaceBeltrami) -> Floats:
     See Also
     --------
     principal_curvatures : How the surface curves, independent of the size of the neighbourhood.
-    roughness : Height of points above the smoothed surface, as a length.
+    clean.roughness : Height of points above the smoothed surface, as a length.
 
     References
     ----------
@@ -39,7 +39,7 @@ def surface_variation(laplacian: LaplaceBeltrami) -> Floats:
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> variation = mf.surface_variation(mf.build_laplacian(points * [1.0, 1.0, 0.3]))
+    >>> variation = mf.measure.surface_variation(mf.build_laplacian(points * [1.0, 1.0, 0.3]))
     >>> equator = np.abs(points[:, 2]) < 0.1
     >>> print(variation[equator].min() > variation[~equator].mean())
     True

@@ -74,7 +74,7 @@ def enclosed_volume(
     See Also
     --------
     measure_region : Area and boundary of a part of the surface.
-    mesh_surface : The mesh that is integrated over.
+    surface.mesh_surface : The mesh that is integrated over.
 
     Notes
     -----
@@ -93,7 +93,7 @@ def enclosed_volume(
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> found = mf.enclosed_volume(mf.build_laplacian(points))
+    >>> found = mf.measure.enclosed_volume(mf.build_laplacian(points))
     >>> print(round(found.volume, 2), found.uncertainty < 0.2, found.openings)
     4.19 True [0]
     """

@@ -51,7 +51,7 @@ class Heat:
     See Also
     --------
     Wave, ReactionDiffusion : Other motions.
-    spectral_filter : With `exponential`, heat after any time from modes.
+    clean.spectral_filter : With `clean.exponential`, heat after any time from modes.
 
     Notes
     -----
@@ -69,7 +69,7 @@ class Heat:
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> heat = mf.Heat(mf.build_laplacian(points), 0.1)
+    >>> heat = mf.motion.Heat(mf.build_laplacian(points), 0.1)
     >>> warm = heat.advance(points[:, 2])
     >>> print((warm / points[:, 2]).mean().round(2), np.exp(-0.2).round(2))
     0.82 0.82
@@ -149,7 +149,7 @@ class Wave:
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> wave = mf.Wave(mf.build_laplacian(points), np.pi / np.sqrt(2) / 10)
+    >>> wave = mf.motion.Wave(mf.build_laplacian(points), np.pi / np.sqrt(2) / 10)
     >>> state = points[:, 2], np.zeros(800)
     >>> for _ in range(10):
     ...     state = wave.advance(state)

@@ -79,7 +79,7 @@ class ReactionDiffusion:
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> reaction = mf.ReactionDiffusion(mf.build_laplacian(points), 50.0, 0.04, 0.06, (2e-4, 1e-4))
+    >>> reaction = mf.motion.ReactionDiffusion(mf.build_laplacian(points), 50.0, 0.04, 0.06, (2e-4, 1e-4))
     >>> food, eater = reaction.advance((np.full(800, 0.5), np.zeros(800)))
     >>> print(food.min().round(2), food.max().round(2), eater.max())
     0.93 0.93 0.0

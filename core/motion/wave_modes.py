@@ -71,7 +71,7 @@ def wave_modes(
     >>> points = mf.example_sphere()
     >>> z = points[:, 2]
     >>> laplacian = mf.build_laplacian(points)
-    >>> wave = mf.wave_modes(laplacian.eigenpairs(4), laplacian.areas, z, np.zeros(800))
+    >>> wave = mf.motion.wave_modes(laplacian.eigenpairs(4), laplacian.areas, z, np.zeros(800))
     >>> print(np.abs(wave(np.pi / np.sqrt(2)) + z).max().round(2))
     0.0
     """

@@ -87,7 +87,7 @@ def divergence_matrix(laplacian: LaplaceBeltrami) -> sparse.csr_array:
     See Also
     --------
     gradient_matrix : The gradient.
-    solve_poisson : Finds the function whose gradient is nearest to given vectors, from their divergence.
+    distance.solve_poisson : Finds the function whose gradient is nearest to given vectors, from their divergence.
 
     Examples
     --------

@@ -119,9 +119,9 @@ class LaplaceBeltrami(Frozen):
     def quadric_mean_curvature(self) -> Floats:
         """Mean curvature of local quadrics through the nearest points, (n,) [1 / L].
 
-        `mean_curvature` is nearer to the truth: without noise the operator's own is, by 3 % on 800 even points of a
-        sphere and by 0.3 % on 8,000; with noise that scatters three to ten times as much as this, and averages of this
-        scatter less.
+        `measure.mean_curvature` is nearer to the truth: without noise the operator's own is, by 3 % on 800 even points
+        of a sphere and by 0.3 % on 8,000; with noise that scatters three to ten times as much as this, and averages of
+        this scatter less.
         """
         return 0.5 * np.trace(self.shape_operator, axis1=1, axis2=2)
 
@@ -163,7 +163,7 @@ class LaplaceBeltrami(Frozen):
         See Also
         --------
         orient_normals : Finds the sides.
-        mean_curvature : Has the sign that the normals give it.
+        measure.mean_curvature : Has the sign that the normals give it.
 
         Examples
         --------
@@ -173,7 +173,7 @@ class LaplaceBeltrami(Frozen):
         >>> import meshfree_laplacian as mf
         >>> points = mf.example_sphere()
         >>> inner = mf.build_laplacian(points).toward(-points)
-        >>> print(mf.mean_curvature(inner).mean().round(2))
+        >>> print(mf.measure.mean_curvature(inner).mean().round(2))
         -1.0
         """
         given = check_values(directions, len(self.normals))
@@ -212,8 +212,8 @@ class LaplaceBeltrami(Frozen):
         See Also
         --------
         LaplaceBeltrami.eigenpairs : Its eigenfunctions.
-        mean_curvature : Applies it to the coordinates.
-        solve_poisson : Its inverse.
+        measure.mean_curvature : Applies it to the coordinates.
+        distance.solve_poisson : Its inverse.
 
         Examples
         --------
@@ -281,9 +281,9 @@ class LaplaceBeltrami(Frozen):
         See Also
         --------
         LaplaceBeltrami.corrected : The symbol correction alone.
-        spectral_filter : Filters functions by modes.
-        heat_kernel_signature : Distinguishes points by modes.
-        segment : Finds parts by modes.
+        clean.spectral_filter : Filters functions by modes.
+        spectral.heat_kernel_signature : Distinguishes points by modes.
+        spectral.segment : Finds parts by modes.
 
         Examples
         --------
@@ -353,7 +353,7 @@ def build_laplacian(
         Distance of every point to the boundary along the surface [L], instead of a measured one; infinity where it is
         far. With `boundary`, distances next to corners, where there are two boundaries, are measured nevertheless.
     left_out : array_like, (k,) int or (n,) bool, optional
-        Points to leave out, such as `floaters`: on the others the operator is that of them alone.
+        Points to leave out, such as `splats.floaters`: on the others the operator is that of them alone.
     agreed : Agreed, optional
         What was decided for a cloud that these points are all of, or a part of with a halo around; see `Agreed`.
     progress : callable, optional
@@ -376,7 +376,7 @@ def build_laplacian(
     LaplacianOptions : All settings.
     estimate_areas : Areas alone.
     estimate_normals : Normals alone.
-    check_stability : Judges the operator.
+    paper.check_stability : Judges the operator.
     paper.build_laplacian : The operator of the paper below, to the letter.
 
     References

@@ -19,7 +19,7 @@ _DECIDES = 0.5  # of a curvature's size: noise that leaves more decides it
 
 @dataclass(frozen=True, eq=False)
 class MeanCurvature(Frozen):
-    """The mean curvature of a surface at each point, made by `measure_mean_curvature`.
+    """The mean curvature of a surface at each point, made by `measure.measure_mean_curvature`.
 
     Attributes
     ----------
@@ -54,9 +54,9 @@ def mean_curvature(laplacian: LaplaceBeltrami) -> Floats:
 
     See Also
     --------
-    measure_mean_curvature : The same with what noise has left in it.
+    measure.measure_mean_curvature : The same with what noise has left in it.
     LaplaceBeltrami.apply : What it is computed by.
-    principal_curvatures : Both curvatures that it is the mean of.
+    measure.principal_curvatures : Both curvatures that it is the mean of.
     estimate_normals : The normals alone.
 
     Examples
@@ -67,7 +67,7 @@ def mean_curvature(laplacian: LaplaceBeltrami) -> Floats:
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> laplacian = mf.build_laplacian(points)
-    >>> curvature = mf.mean_curvature(laplacian)
+    >>> curvature = mf.measure.mean_curvature(laplacian)
     >>> print(curvature.min().round(1), curvature.max().round(1))
     1.0 1.0
     """
@@ -88,7 +88,7 @@ def measure_mean_curvature(laplacian: LaplaceBeltrami) -> MeanCurvature:
 
     See Also
     --------
-    mean_curvature : Its values.
+    measure.mean_curvature : Its values.
 
     Examples
     --------
@@ -99,7 +99,7 @@ def measure_mean_curvature(laplacian: LaplaceBeltrami) -> MeanCurvature:
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> noise = 0.013 * np.random.default_rng(0).normal(size=(len(points), 1))
-    >>> found = mf.measure_mean_curvature(mf.build_laplacian(points * (1.0 + noise)))
+    >>> found = mf.measure.measure_mean_curvature(mf.build_laplacian(points * (1.0 + noise)))
     >>> print(found.values.mean().round(1), found.scatter.mean() < 0.1, found.notices)
     1.0 True []
     """
@@ -139,12 +139,13 @@ def _notices(laplacian: LaplaceBeltrami, averages: Averages, size: Floats, scatt
 
 @dataclass(frozen=True, eq=False)
 class PrincipalCurvatures(Frozen):
-    """The greatest and the least curvature of a surface at each point, made by `principal_curvatures`.
+    """The greatest and the least curvature of a surface at each point, made by `measure.principal_curvatures`.
 
     Attributes
     ----------
     first, second : ndarray, (n,)
-        Greatest and least curvature of the curves across the surface [1 / L], with the sign of `mean_curvature`.
+        Greatest and least curvature of the curves across the surface [1 / L], with the sign of
+        `measure.mean_curvature`.
     direction : ndarray, (n, 3)
         Unit tangent along which the first is met; the second is met across it. Where both are alike it is arbitrary,
         and its sign is so everywhere.
@@ -190,7 +191,7 @@ def principal_curvatures(laplacian: LaplaceBeltrami) -> PrincipalCurvatures:
 
     See Also
     --------
-    mean_curvature : Their mean.
+    measure.mean_curvature : Their mean.
 
     References
     ----------
@@ -203,7 +204,7 @@ def principal_curvatures(laplacian: LaplaceBeltrami) -> PrincipalCurvatures:
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> curvatures = mf.principal_curvatures(mf.build_laplacian(points))
+    >>> curvatures = mf.measure.principal_curvatures(mf.build_laplacian(points))
     >>> print(curvatures.first.mean().round(1), curvatures.second.mean().round(1))
     1.0 1.0
     >>> print(curvatures.shape_index.mean().round(1))

@@ -83,7 +83,7 @@ def check_stability(laplacian: LaplaceBeltrami) -> Stability:
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> laplacian = mf.build_laplacian(points)
-    >>> stability = mf.check_stability(laplacian)
+    >>> stability = mf.paper.check_stability(laplacian)
     >>> print(stability.components, stability.row_sum < 1e-12, stability.concerns())
     1 True []
     """

@@ -107,7 +107,7 @@ def bone_weights(
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> laplacian = mf.build_laplacian(points)
-    >>> weights = mf.bone_weights(laplacian, [[0, 0, -0.8], [0, 0, 0]], [[0, 0, 0], [0, 0, 0.8]])
+    >>> weights = mf.rig.bone_weights(laplacian, [[0, 0, -0.8], [0, 0, 0]], [[0, 0, 0], [0, 0, 0.8]])
     >>> print(weights[[0, 400, 799], 1].round(1), np.allclose(weights.sum(axis=1), 1))
     [1.  0.5 0. ] True
     """
@@ -169,7 +169,7 @@ def nearest_bones(points: ArrayLike, heads: ArrayLike, tails: ArrayLike) -> Floa
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> weights = mf.nearest_bones(points[[0, 799]], [[0, 0, -0.8], [0, 0, 0]], [[0, 0, 0], [0, 0, 0.8]])
+    >>> weights = mf.rig.nearest_bones(points[[0, 799]], [[0, 0, -0.8], [0, 0, 0]], [[0, 0, 0], [0, 0, 0.8]])
     >>> print(weights[:, 1])
     [1. 0.]
     """

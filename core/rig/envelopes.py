@@ -53,7 +53,7 @@ def envelope_share(
     >>> points = mf.example_sphere()
     >>> heads, tails = np.zeros_like(points), np.zeros_like(points) + (0, 0, 1)
     >>> half = np.full(len(points), 0.5)
-    >>> found = mf.envelope_share(points, heads, tails, half, half, half)
+    >>> found = mf.rig.envelope_share(points, heads, tails, half, half, half)
     >>> print(found[[0, 200, 799]].round(1))
     [1.  0.5 0. ]
     """

@@ -62,7 +62,7 @@ def inpaint(
 
     See Also
     --------
-    harmonic_field : Fixed values in any thin sets, at full accuracy.
+    distance.harmonic_field : Fixed values in any thin sets, at full accuracy.
     smooth_weights : Also fills points without weights.
 
     Notes
@@ -83,7 +83,7 @@ def inpaint(
     >>> points = mf.example_sphere()
     >>> z = points[:, 2]
     >>> known = np.abs(z) > 0.4
-    >>> found = mf.inpaint(mf.build_laplacian(points), known, z[known])
+    >>> found = mf.rig.inpaint(mf.build_laplacian(points), known, z[known])
     >>> print(np.abs(found - z).max() < 0.02, np.array_equal(found[known], z[known]))
     True True
     """
@@ -151,7 +151,7 @@ def inpaint_labels(laplacian: LaplaceBeltrami, known: ArrayLike, labels: ArrayLi
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> known = np.abs(points[:, 2]) > 0.8
-    >>> found = mf.inpaint_labels(mf.build_laplacian(points), known, points[known, 2] > 0)
+    >>> found = mf.rig.inpaint_labels(mf.build_laplacian(points), known, points[known, 2] > 0)
     >>> print((found == (points[:, 2] > 0)).mean() > 0.97)
     True
     """

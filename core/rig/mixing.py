@@ -58,7 +58,7 @@ def mix_weights(
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> before, taken = np.tile([0.5, 0.5, 0], (800, 1)), np.tile([0, 0.2, 0.8], (800, 1))
-    >>> print(mf.mix_weights(before, taken, locked=[0], normalize=True)[0].round(2))
+    >>> print(mf.rig.mix_weights(before, taken, locked=[0], normalize=True)[0].round(2))
     [0.5 0.1 0.4]
     """
     advice = "Give one row for each point, with a weight for each group."
@@ -111,7 +111,7 @@ def are_normalized(weights: ArrayLike) -> bool:
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> upper = points[:, 2] > 0
-    >>> print(mf.are_normalized(np.column_stack([upper, ~upper])), mf.are_normalized(0.5 * upper[:, None]))
+    >>> print(mf.rig.are_normalized(np.column_stack([upper, ~upper])), mf.rig.are_normalized(0.5 * upper[:, None]))
     True False
     """
     total = as_doubles(check_array(weights, "Weights", [(None, None)], "Give a row for each point.", "biuf")).sum(

@@ -122,7 +122,7 @@ def match_surface(
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> source = mf.build_laplacian(points)
-    >>> match = mf.match_surface(mf.build_laplacian(points[:, [1, 2, 0]]), source)
+    >>> match = mf.rig.match_surface(mf.build_laplacian(points[:, [1, 2, 0]]), source)
     >>> print(match.known.all(), match.distance.max() < 1e-2)
     True True
     """

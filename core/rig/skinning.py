@@ -57,7 +57,7 @@ def skin(
     See Also
     --------
     bone_weights : Finds weights.
-    Splats.deformed : Carries ellipsoids and harmonics by gradients.
+    splats.Splats.deformed : Carries ellipsoids and harmonics by gradients.
 
     References
     ----------
@@ -73,7 +73,7 @@ def skin(
     >>> points = mf.example_sphere()
     >>> upper = (points[:, 2] > 0).astype(float)[:, None]
     >>> shift = np.column_stack([np.eye(3), [0, 0, 5]])
-    >>> moved = mf.skin(points, upper, [shift])
+    >>> moved = mf.rig.skin(points, upper, [shift])
     >>> print((moved - points)[[0, 799], 2])
     [5. 0.]
     """
@@ -112,7 +112,7 @@ class Skinner:
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> skinner = mf.Skinner(np.ones((len(points), 1)))
+    >>> skinner = mf.rig.Skinner(np.ones((len(points), 1)))
     >>> for shift in (1, 2):
     ...     moved = skinner.move(points, [np.column_stack([np.eye(3), [0, 0, shift]])])
     ...     print((moved - points)[0])

@@ -98,7 +98,7 @@ def smooth_weights(
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> hard = np.column_stack([points[:, 2] > 0, points[:, 2] <= 0]).astype(float)
-    >>> soft = mf.smooth_weights(mf.build_laplacian(points), hard, 0.5)
+    >>> soft = mf.rig.smooth_weights(mf.build_laplacian(points), hard, 0.5)
     >>> print(soft[[0, 400], 0].round(1), np.allclose(soft.sum(axis=1), 1))
     [1.  0.5] True
     """

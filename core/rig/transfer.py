@@ -55,8 +55,8 @@ def transfer_values(
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> target, source = mf.build_laplacian(points[:, [1, 2, 0]]), mf.build_laplacian(points)
-    >>> match = mf.match_surface(target, source)
-    >>> height = mf.transfer_values(target, match, points[:, 2])
+    >>> match = mf.rig.match_surface(target, source)
+    >>> height = mf.rig.transfer_values(target, match, points[:, 2])
     >>> print(np.abs(height - target.points[:, 2]).max() < 0.01)
     True
     """
@@ -107,7 +107,7 @@ def transfer_labels(target: LaplaceBeltrami, match: SurfaceMatch, labels: ArrayL
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> target, source = mf.build_laplacian(points[:, [1, 2, 0]]), mf.build_laplacian(points)
-    >>> found = mf.transfer_labels(target, mf.match_surface(target, source), points[:, 2] > 0)
+    >>> found = mf.rig.transfer_labels(target, mf.rig.match_surface(target, source), points[:, 2] > 0)
     >>> print((found == (target.points[:, 2] > 0)).mean() > 0.95)
     True
     """

@@ -108,7 +108,7 @@ def heat_kernel_signature(
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> spectrum = mf.build_laplacian(points).eigenpairs(16)
-    >>> heat = mf.heat_kernel_signature(spectrum, [1.0])
+    >>> heat = mf.spectral.heat_kernel_signature(spectrum, [1.0])
     >>> print(heat.shape, heat.min().round(3), heat.max().round(3))
     (800, 1) 0.113 0.113
     """
@@ -168,7 +168,7 @@ def wave_kernel_signature(spectrum: Spectrum, energies: ArrayLike | None = None,
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> spectrum = mf.build_laplacian(points).eigenpairs(16)
-    >>> waves = mf.wave_kernel_signature(spectrum, count=8)
+    >>> waves = mf.spectral.wave_kernel_signature(spectrum, count=8)
     >>> print(waves.shape, waves.min().round(2), waves.max().round(2))
     (800, 8) 0.08 0.08
     """

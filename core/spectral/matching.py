@@ -98,7 +98,7 @@ def match_modes(
     >>> laplacian = mf.build_laplacian(points)
     >>> before = laplacian.eigenpairs(4)
     >>> after = mf.Spectrum(before.eigenvalues, -before.eigenvectors)  # as another run may give them
-    >>> matched = mf.match_modes(after, laplacian.areas, points, before, points)
+    >>> matched = mf.spectral.match_modes(after, laplacian.areas, points, before, points)
     >>> np.allclose(matched.spectrum.eigenvectors, before.eigenvectors)
     True
     """

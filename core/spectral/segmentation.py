@@ -25,7 +25,7 @@ _ROUNDS = 4  # of leaving such clusters out
 
 
 def nodal_domains(
-    values: ArrayLike, laplacian: LaplaceBeltrami, *, threshold: float = 0.02, bridge: float = 0.1, smallest: int = 5
+    laplacian: LaplaceBeltrami, values: ArrayLike, *, threshold: float = 0.02, bridge: float = 0.1, smallest: int = 5
 ) -> Ints:
     """Divide the points into connected sets on which a function keeps its sign.
 
@@ -36,10 +36,10 @@ def nodal_domains(
 
     Parameters
     ----------
-    values : array_like, (n,)
-        A function on the points, such as a column of ``Spectrum.eigenvectors``.
     laplacian : LaplaceBeltrami
         Of n points.
+    values : array_like, (n,)
+        A function on the points, such as a column of ``Spectrum.eigenvectors``.
     threshold : float
         Share of the largest size of the values below which a sign is not trusted.
     bridge : float
@@ -79,9 +79,9 @@ def nodal_domains(
     >>> points = mf.example_sphere()
     >>> z = points[:, 2]
     >>> laplacian = mf.build_laplacian(points)
-    >>> print(np.bincount(mf.nodal_domains(z, laplacian)))
+    >>> print(np.bincount(mf.spectral.nodal_domains(laplacian, z)))
     [400 400]
-    >>> print(mf.nodal_domains(points[:, 0] * points[:, 1], laplacian).max() + 1)
+    >>> print(mf.spectral.nodal_domains(laplacian, points[:, 0] * points[:, 1]).max() + 1)
     4
     """
     n = len(laplacian.points)
@@ -163,7 +163,7 @@ def segment(
     >>> points = mf.example_sphere()
     >>> z = points[:, 2]
     >>> dumbbell = points * (0.4 + np.abs(z))[:, None]
-    >>> labels = mf.segment(mf.build_laplacian(dumbbell), 2)
+    >>> labels = mf.spectral.segment(mf.build_laplacian(dumbbell), 2)
     >>> print(labels.max() + 1, np.ptp(labels[z > 0.1]), np.ptp(labels[z < -0.1]))
     2 0 0
     """

@@ -48,7 +48,7 @@ class Splats(Frozen):
     See Also
     --------
     read_splats, write_splats : Files of splats.
-    deformation_gradients : The maps by which a moved surface deforms splats.
+    deform.deformation_gradients : The maps by which a moved surface deforms splats.
 
     References
     ----------
@@ -97,7 +97,7 @@ class Splats(Frozen):
         positions : array_like, (n, 3)
             Their positions after it [L].
         gradients : array_like, (n, 3, 3)
-            Its gradients F: maps of small steps around each of them, of `deformation_gradients` or any other.
+            Its gradients F: maps of small steps around each of them, of `deform.deformation_gradients` or any other.
 
         Returns
         -------

@@ -108,7 +108,7 @@ def mesh_surface(laplacian: LaplaceBeltrami, detail: float = 1.0, *, progress: P
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
-    >>> mesh = mf.mesh_surface(mf.build_laplacian(points))
+    >>> mesh = mf.surface.mesh_surface(mf.build_laplacian(points))
     >>> print(len(mesh.vertices) - len(mesh.faces))
     2
     >>> print(np.abs(np.linalg.norm(mesh.vertices, axis=1) - 1).max() < 1e-3)

@@ -71,7 +71,7 @@ def cut_to_store(
     viewpoint : array_like, (3,), optional
         For 'viewpoint': one place [L]; else that of the column "scanner" at each point.
     wavelength : float, optional
-        Of the roughness [L], see `mf.roughness`; zero for the usual one. If not given, there is no roughness.
+        Of the roughness [L], see `mf.clean.roughness`; zero for the usual one. If not given, there is no roughness.
     memory : int, optional
         Bytes that a tile may take: larger ones are left out, with an error.
     workers : int

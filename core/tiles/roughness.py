@@ -34,7 +34,7 @@ def tell_lengths(site: Site, cloud: Cloud) -> Told:
 
 
 def agree_on_wavelength(shelf: Shelf, step: str) -> Record:
-    """Agree on the wavelength of the whole cloud, by the lengths that a step has told; as of `mf.roughness`."""
+    """Agree on the wavelength of the whole cloud, by the lengths that a step has told; as of `mf.clean.roughness`."""
     if shelf.record.get(_WAVELENGTH) != 0.0:
         return {}
     return {_WAVELENGTH: np.array(DETAIL * median(lambda: shelf.told(step, "lengths")))}

@@ -52,9 +52,9 @@ class Follower:
 
     def __init__(self, binding: Binding, progress):
         self.binding, self.last = binding, {}
-        self.quick = self._bind(core.coarse_deformer, progress)
+        self.quick = self._bind(core.deform.coarse_deformer, progress)
         # Splats scatter about their surface, which the coarse solver averages.
-        of_all = binding.splats is not None or isinstance(self.quick, core.Deformer)
+        of_all = binding.splats is not None or isinstance(self.quick, core.deform.Deformer)
         self.exact = self.quick if of_all else None
 
     def _bind(self, make, progress):
@@ -81,7 +81,7 @@ class Follower:
     def prepare(self, progress):
         """Factorize for settled results, if necessary, and return this."""
         if self.exact is None:
-            self.exact = self._bind(core.Deformer, progress)
+            self.exact = self._bind(core.deform.Deformer, progress)
         return self
 
     def move(self, pose: HandlePose, discs, state: State, start=None, progress=None) -> Moved:

@@ -70,7 +70,7 @@ class Binding:
     rest: np.ndarray
     matrix: np.ndarray
     constraints: Constraints | None
-    splats: "core.Splats | None"
+    splats: "core.splats.Splats | None"
     rotation_aware: bool
     softness: float | None
     options: LaplacianOptions

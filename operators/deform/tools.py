@@ -174,7 +174,7 @@ def _plan_ends(context, obj):
     def choose(laplacian, progress):
         progress("Ends", 0.0)
         points, kept = laplacian.points, held > 0.0
-        ends = core.opposite_ends(laplacian)
+        ends = core.distance.opposite_ends(laplacian)
         if kept.any():
             center = points[kept].mean(axis=0)
             ends = sorted(ends, key=lambda rows: np.linalg.norm(points[rows].mean(axis=0) - center))

@@ -144,7 +144,7 @@ class MESHFREE_OT_export_splats(ExportOperator, SplatOperator, bpy.types.Operato
 
         def write(path, progress):
             progress("Write", 0.0)
-            core.write_splats(path, splats)
+            core.splats.write_splats(path, splats)
             return f"{name}: {len(splats):,} splats written to {path.name}{hint}"
 
         return write

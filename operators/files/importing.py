@@ -105,7 +105,7 @@ class MESHFREE_OT_import_points(ImportOperator, bpy.types.Operator):
         shared = known_offset(context.scene)
         surfaces, clouds = [], []
         for path, (table, found) in zip(self._paths, read, strict=True):
-            if isinstance(table, core.Splats):
+            if isinstance(table, core.splats.Splats):
                 obj = self._add_splats(context, path.stem, table, shared)
                 clouds.append(obj)
                 shared = shared if shared is not None or OFFSET not in obj else offset_of(obj)
@@ -183,11 +183,12 @@ def _read_all(paths, columns, choices, surface, progress):
         tables.append(cache.fetch(key, lambda path=path: read_file(path, columns, choices)))
     if not surface:
         return [(table, None) for table in tables]
-    total = sum(len(table.points) for table in tables if not isinstance(table, core.Splats))
+    total = sum(len(table.points) for table in tables if not isinstance(table, core.splats.Splats))
     if total > _QUICK:
         return [(table, f"Discs of {total:,} points take a while: press Show as Surface") for table in tables]
     return [
-        (table, None if isinstance(table, core.Splats) else _find_discs(table.points, progress)) for table in tables
+        (table, None if isinstance(table, core.splats.Splats) else _find_discs(table.points, progress))
+        for table in tables
     ]
 
 
@@ -195,7 +196,9 @@ def _find_discs(points, progress):
     """Return the discs of points for the display, (n, 3); a text if they form no surface."""
     points = points - points.mean(axis=0)  # squares of large coordinates would lose all digits
     try:
-        found = cache.fetch(cache.content("discs", points), lambda: core.surface_discs(points, progress=progress))
+        found = cache.fetch(
+            cache.content("discs", points), lambda: core.surface.surface_discs(points, progress=progress)
+        )
         shown = discs(found.normals, found.radii, points)
         check_size(DISC, shown)
     except PointCloudError as error:

@@ -86,7 +86,7 @@ def save(path, obj, arrays, shown="") -> list:
     if suffix == ".npz":
         save_arrays(path, arrays)
     elif suffix == ".ply" and has_splats(obj.data):
-        core.write_splats(path, with_results(splats_to_write(obj), obj.data))
+        core.splats.write_splats(path, with_results(splats_to_write(obj), obj.data))
     elif suffix in WRITABLE:
         table = point_table(bpy.context, obj)
         return [*table.notices, *write_points(path, table, double=not table.single)]

@@ -189,7 +189,7 @@ def _read_anew(paths, wanted, name, progress) -> tuple[PointTable, int]:
     if wanted.count is None:
         kept = list(_within_memory(pieces))
     else:
-        kept = core.thin_pieces(pieces, wanted.count)
+        kept = core.clean.thin_pieces(pieces, wanted.count)
     if not kept and wanted.box is not None:
         raise PointCloudError(f"None of the {seen.total:,} points is inside the box. Move or scale its object.")
     las, differing = join_forms(seen.forms)

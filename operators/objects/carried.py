@@ -73,7 +73,7 @@ def moved_discs(vectors, gradients):
     """Return discs, normals times radii, (n, 3), after a deformation with these gradients, (n, 3, 3)."""
     radii = np.linalg.norm(vectors, axis=1)
     known = radii > 0.0  # added points have zeros
-    moved = core.Discs(vectors[known] / radii[known, None], radii[known]).deformed(gradients[known])
+    moved = core.surface.Discs(vectors[known] / radii[known, None], radii[known]).deformed(gradients[known])
     result = np.zeros(vectors.shape)
     result[known] = moved.normals * moved.radii[:, None]
     return result

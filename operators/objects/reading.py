@@ -97,7 +97,7 @@ class Reading:
     boundary: np.ndarray | None = None
     notices: list = field(default_factory=list)
     orientation: np.ndarray | None = None
-    splats: "core.Splats | None" = None
+    splats: "core.splats.Splats | None" = None
 
     def local(self, vectors):
         """Transform points or displacements, as read, to local space."""

@@ -47,7 +47,7 @@ def harmonic_names(data) -> list:
     return names[: max(known for known in core.splats.COUNTS if known <= len(names))]
 
 
-def read_splats(data, with_harmonics=True) -> "core.Splats":
+def read_splats(data, with_harmonics=True) -> "core.splats.Splats":
     """Read the splats of a mesh or a point cloud, in local space, without harmonics as if they were of degree 0.
 
     Raises
@@ -64,7 +64,7 @@ def read_splats(data, with_harmonics=True) -> "core.Splats":
     harmonics = np.empty((len(base), len(names), 3), np.float32)
     for number, name in enumerate(names):
         harmonics[:, number] = read_attribute(data, name)
-    return core.Splats(
+    return core.splats.Splats(
         own_positions(data),
         read_attribute(data, SCALE),
         read_attribute(data, ROTATION),
@@ -96,7 +96,7 @@ def write_splats(data, splats):
     tag_changed(data)
 
 
-def shown_splats(obj) -> "core.Splats":
+def shown_splats(obj) -> "core.splats.Splats":
     """Return the splats of an object as its deformation shows them, interpolated from rest by its strength."""
     data = obj.data
     splats = read_splats(data)

@@ -84,13 +84,13 @@ class AutoWeights(Tool):
                 laplacian = operator(part(0.0, _BUILDING))
             except (TooFewPointsError, NotASurfaceError) as error:
                 notices.append(f"Each point follows the nearest bone alone, since there is no surface: {error}")
-                weights = core.nearest_bones(reading.points, *ends)
+                weights = core.rig.nearest_bones(reading.points, *ends)
             else:
                 left = np.count_nonzero(laplacian.component < 0)
                 if left:
                     notices.append(f"Points on no surface: {left:,}. They have the weights of the nearest one on it.")
                 rest = part(_BUILDING, 1.0 - _BUILDING)
-                weights = core.bone_weights(laplacian, *ends, **settings, notices=notices, progress=rest)
+                weights = core.rig.bone_weights(laplacian, *ends, **settings, notices=notices, progress=rest)
             return _Weighted(uid, bones.names, ends, weights, notices)
 
         return compute

@@ -34,7 +34,7 @@ class BoneBinding:
     """
 
     rest: np.ndarray
-    splats: "core.Splats | None"
+    splats: "core.splats.Splats | None"
     bones: np.ndarray
     weights: np.ndarray
     count: int
@@ -76,7 +76,7 @@ class BoneFollower:
 
     def __init__(self, binding: BoneBinding):
         self.binding, self.last, self.notices = binding, {}, []
-        self._skinner = core.Skinner(binding.weights, binding.bones, binding.count)
+        self._skinner = core.rig.Skinner(binding.weights, binding.bones, binding.count)
         self._rest, self._size = binding.rest.astype(np.float64), np.ptp(binding.rest, axis=0).max()
         self._placed = np.zeros((4, 4)), None  # the last transform to the armature's space, and the points there
 

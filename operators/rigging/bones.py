@@ -105,7 +105,7 @@ class Envelopes(NamedTuple):
 
     def shares(self, points, bones):
         """Return by how much the weights of points, (k, 3), of a bone each, (k,) int, are multiplied, (k,)."""
-        return core.envelope_share(points, *self.ends[:, bones], *self.sizes[:, bones])
+        return core.rig.envelope_share(points, *self.ends[:, bones], *self.sizes[:, bones])
 
 
 def envelopes(armature, names) -> Envelopes:

@@ -116,7 +116,11 @@ class WeightsFromSelection(Tool):
 
         def find(laplacian, progress):
             distance = along.distance(laplacian, ones, cache, progress)
-            return core.falloff(distance, radius, shape), np.isfinite(distance), f"within {length_text(radius)}"
+            return (
+                core.distance.falloff(distance, radius, shape),
+                np.isfinite(distance),
+                f"within {length_text(radius)}",
+            )
 
         return find
 

@@ -123,7 +123,7 @@ class SmoothWeights(Tool):
                 def report(stage, fraction, number=number):
                     progress(stage, 0.5 + 0.5 * (number + fraction) / len(parts))
 
-                result[:, part.columns] = core.smooth_weights(
+                result[:, part.columns] = core.rig.smooth_weights(
                     laplacian,
                     weights[:, part.columns],
                     reach,

@@ -52,7 +52,7 @@ class Weights(NamedTuple):
     def are_normalized(self) -> bool:
         """Whether these sums are one: without an armature at all points, for groups may be parts of the surface."""
         table = self.columns(self.summed)
-        return core.are_normalized(table) and (bool(self.bones) or bool(table.any(axis=1).all()))
+        return core.rig.are_normalized(table) and (bool(self.bones) or bool(table.any(axis=1).all()))
 
 
 class _Change(NamedTuple):
@@ -158,7 +158,7 @@ class TransferWeights(Transfer):
         def compute(progress):
             match, table = find(progress), before.copy()
             if not preview:
-                taken = core.transfer_values(
+                taken = core.rig.transfer_values(
                     match.laplacian,
                     match.places,
                     np.concatenate([values.columns(names) for values in given]),
@@ -168,7 +168,7 @@ class TransferWeights(Transfer):
                 for some, normalize in ((summed, normalized), (~summed, False)):
                     if not some.any():
                         continue
-                    table[:, some] = core.mix_weights(
+                    table[:, some] = core.rig.mix_weights(
                         before[:, some],
                         taken[:, some],
                         mix=mix,

@@ -122,9 +122,9 @@ def result(laplacian, *settings, compute):
     return fetch(content(_sources[laplacian], *settings), compute, laplacian)
 
 
-def geodesics(laplacian, progress) -> "core.Geodesics":
+def geodesics(laplacian, progress) -> "core.distance.Geodesics":
     """Return the solver of geodesic distances of an operator from `build`, made only once."""
-    return result(laplacian, "geodesics", compute=lambda: core.Geodesics(laplacian, progress=progress))
+    return result(laplacian, "geodesics", compute=lambda: core.distance.Geodesics(laplacian, progress=progress))
 
 
 def fetch(key, compute, laplacian=None):

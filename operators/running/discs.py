@@ -21,7 +21,7 @@ def disc_finder(obj, reading):
         if rest is None:
             return None
         local = reading.local(full)
-        found = cache.fetch(cache.content("discs", local), lambda: core.surface_discs(local))
+        found = cache.fetch(cache.content("discs", local), lambda: core.surface.surface_discs(local))
         moved = discs(core.geometry.toward(found.normals, rest), found.radii, local)
         steps = [np.linalg.norm(places - reading.points, axis=1) for places in (points, full)]
         share = np.divide(*steps, out=np.zeros(len(local)), where=steps[1] > 0.0)

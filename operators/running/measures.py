@@ -33,7 +33,7 @@ class Measured(NamedTuple):
     built: Built
     subset: np.ndarray
     measures: dict
-    prolongation: "core.Prolongation | None"
+    prolongation: "core.clean.Prolongation | None"
     left_out: np.ndarray
 
     def carried(self, vectors):
@@ -76,7 +76,7 @@ def measure(points, options, boundary, budget, modes, progress, orientation=None
 
     def prolong():
         report = _within(progress, "All Points")
-        return core.Prolongation(points, subset, laplacian.normals, laplacian.component, progress=report)
+        return core.clean.Prolongation(points, subset, laplacian.normals, laplacian.component, progress=report)
 
     progress("All Points", 0.9)
     prolongation = cache.result(laplacian, "prolongation", points, compute=prolong)
@@ -124,7 +124,7 @@ def _subset(points, options, boundary, splats, budget, modes, progress):
             return _ALL
         progress("Subset", 0.0)
         kept = np.delete(np.arange(count), cache.floating(splats))
-        return kept[core.blue_noise_subset(points[kept], most, progress=_within(progress, "Subset"))]
+        return kept[core.clean.blue_noise_subset(points[kept], most, progress=_within(progress, "Subset"))]
 
     return cache.fetch(cache.content(points, options, boundary, cache.floating(splats), "subset", budget), choose)
 

@@ -86,7 +86,7 @@ class Align(Tool):
         settings = {"overlap": self.overlap, "scale": self.scale, "pairs": pairs}
 
         def compute(progress):
-            found = core.align(reading.points + shift, target, **settings, progress=progress)
+            found = core.measure.align(reading.points + shift, target, **settings, progress=progress)
             check_found(found, own_name, name, ADVICE)
             return found, motion, name
 

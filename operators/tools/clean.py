@@ -52,7 +52,7 @@ class StraySettings:
 
         def find(progress):
             key = cache.content("strays", reading.points)
-            strays = cache.fetch(key, lambda: core.Strays(reading.points, progress=progress))
+            strays = cache.fetch(key, lambda: core.clean.Strays(reading.points, progress=progress))
             found = strays.chosen(strictness, **sizes)
             found[cache.floating(reading.splats)] = True
             return found & among

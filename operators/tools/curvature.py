@@ -57,7 +57,7 @@ class Curvatures(Tool):
         def compute(progress):
             laplacian = operator(progress)
             progress("Curvature", 0.9)
-            found = cache.result(laplacian, "principal", compute=lambda: core.principal_curvatures(laplacian))
+            found = cache.result(laplacian, "principal", compute=lambda: core.measure.principal_curvatures(laplacian))
             return replace(found, direction=reading.local_directions(found.direction))
 
         return compute
@@ -101,7 +101,7 @@ class Roughness(Tool):
                 laplacian,
                 "roughness",
                 wavelength,
-                compute=lambda: core.roughness(laplacian, wavelength, progress=progress),
+                compute=lambda: core.clean.roughness(laplacian, wavelength, progress=progress),
             )
 
         return compute

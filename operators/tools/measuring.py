@@ -131,16 +131,16 @@ def measured(laplacian, chosen, base, progress) -> Measured:
 
     `base` is what volumes are measured over, None for the plane through the rim.
     """
-    whole = cache.result(laplacian, "measures", compute=lambda: core.SurfaceMeasures(laplacian))
+    whole = cache.result(laplacian, "measures", compute=lambda: core.measure.SurfaceMeasures(laplacian))
     region = cache.result(
         laplacian,
         "region",
         chosen,
-        compute=lambda: core.measure_region(laplacian, chosen, measures=whole, progress=progress),
+        compute=lambda: core.measure.measure_region(laplacian, chosen, measures=whole, progress=progress),
     )
     known = chosen & (laplacian.component >= 0)
     sizes = np.ptp(laplacian.surface_points[known], axis=0)
-    curvature = cache.result(laplacian, "curvature", compute=lambda: core.mean_curvature(laplacian))[known]
+    curvature = cache.result(laplacian, "curvature", compute=lambda: core.measure.mean_curvature(laplacian))[known]
     areas, most = laplacian.areas[known], curvature[np.abs(curvature).argmax()]
     piles, notices = (None, None, None), []
     try:
@@ -218,8 +218,8 @@ class MESHFREE_OT_geodesic_path(SelectionOperator, bpy.types.Operator):
         ends = selected_ends(obj)
         reading, laplacian = analyzed(context, obj)
         path = path_between(laplacian, ends, cache, lambda *_: None)
-        straight = length_text(core.polygon_length(laplacian.points[ends]))
-        line = f"{length_text(core.polygon_length(path))} along the surface, {straight} straight"
+        straight = length_text(core.distance.polygon_length(laplacian.points[ends]))
+        line = f"{length_text(core.distance.polygon_length(path))} along the surface, {straight} straight"
 
         def add():
             made = add_curves(obj, f"{obj.name} Path", [(reading.local(path), False)], self.thickness)

@@ -94,7 +94,7 @@ def surface_mesh(laplacian, detail, progress):
 
     def make():
         mesh = bare_mesh(laplacian, detail, progress)
-        return mesh, core.values_on_mesh(laplacian, mesh.vertices, progress=lambda: progress("Results", 0.95))
+        return mesh, core.surface.values_on_mesh(laplacian, mesh.vertices, progress=lambda: progress("Results", 0.95))
 
     return cache.result(laplacian, "mesh", detail, compute=make)
 
@@ -102,7 +102,7 @@ def surface_mesh(laplacian, detail, progress):
 def bare_mesh(laplacian, detail, progress):
     """Return a mesh of the points of an operator, made only once."""
     return cache.result(
-        laplacian, "bare mesh", detail, compute=lambda: core.mesh_surface(laplacian, detail, progress=progress)
+        laplacian, "bare mesh", detail, compute=lambda: core.surface.mesh_surface(laplacian, detail, progress=progress)
     )
 
 
@@ -111,7 +111,9 @@ def volume_of(laplacian, progress):
     return cache.result(
         laplacian,
         "volume",
-        compute=lambda: core.enclosed_volume(laplacian, mesh=bare_mesh(laplacian, 1.0, progress), progress=progress),
+        compute=lambda: core.measure.enclosed_volume(
+            laplacian, mesh=bare_mesh(laplacian, 1.0, progress), progress=progress
+        ),
     )
 
 

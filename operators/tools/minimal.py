@@ -49,7 +49,7 @@ class MinimalSurface(Tool):
             gradients = None
             if carries:
                 laplacian = build_operator(reading, options, progress).laplacian
-                gradients = core.deformation_gradients(laplacian, film.points)
+                gradients = core.deform.deformation_gradients(laplacian, film.points)
             return reading, film, gradients, find_discs(film.points, film.points)
 
         return compute

@@ -206,7 +206,7 @@ class MESHFREE_OT_select_grow(SelectionOperator, bpy.types.Operator):
         chosen = selected(obj)
         _, laplacian = analyzed(context, obj)
         distance = self.distance or 4.0 * np.sqrt(np.median(laplacian.areas))
-        grown = core.grow(laplacian, chosen, distance)
+        grown = core.distance.grow(laplacian, chosen, distance)
         return lambda: select(context, obj, grown)
 
 
@@ -401,7 +401,9 @@ class MESHFREE_OT_select_point(ReadyOperator, bpy.types.Operator):
             points = positions_now(obj) @ matrix[:3, :3].T + matrix[:3, 3]
             points[_hidden(obj)] = np.nan
             known = obj.meshfree.spacing * np.cbrt(abs(np.linalg.det(matrix[:3, :3])))  # where a display measured it
-            index = core.front_point(points, eye, direction, 2.0 * (known or core.geometry.typical_distance(points)))
+            index = core.distance.front_point(
+                points, eye, direction, 2.0 * (known or core.geometry.typical_distance(points))
+            )
             if index >= 0:
                 found.append(((points[index] - eye) @ direction, obj.name, obj, index))
         return min(found)[2:] if found else None
@@ -468,7 +470,7 @@ class MESHFREE_OT_select_floaters(SelectionOperator, bpy.types.Operator):
     surface = False
 
     def prepare(self, context, obj):
-        chosen = core.floaters(read_splats(obj.data))
+        chosen = core.splats.floaters(read_splats(obj.data))
         if not chosen.any():
             raise PointCloudError(f'None of the {len(chosen):,} splats of "{obj.name}" is a floater.')
         return lambda: select(context, obj, chosen)

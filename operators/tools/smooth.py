@@ -77,7 +77,7 @@ class Smooth(Tool):
         def compute(progress):
             laplacian = operator(progress)
             points, full = smoothing.smoothed(laplacian, own, mask, name, cache, progress)
-            gradients = core.deformation_gradients(laplacian, points) if splats else None
+            gradients = core.deform.deformation_gradients(laplacian, points) if splats else None
             return reading, points, gradients, find_discs(full, points)
 
         return compute
@@ -137,7 +137,7 @@ class ModeShape(Tool):
                 several = max(mode, min(_READY, len(reading.points) // 3))
                 cache.lowest_modes(laplacian, several, progress, raw=True)
             points = smoothing.by_mode(laplacian, number, amplitude, phase, cache, progress)
-            return reading, points, number, core.deformation_gradients(laplacian, points) if carried else None
+            return reading, points, number, core.deform.deformation_gradients(laplacian, points) if carried else None
 
         return compute
 

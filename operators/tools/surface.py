@@ -24,7 +24,9 @@ class MESHFREE_OT_show_surface(ApplicationOperator, bpy.types.Operator):
         sides = chosen_sides(obj)
 
         def compute(progress):
-            found = cache.fetch(cache.content("discs", local), lambda: core.surface_discs(local, progress=progress))
+            found = cache.fetch(
+                cache.content("discs", local), lambda: core.surface.surface_discs(local, progress=progress)
+            )
             normals = found.normals if sides is None else core.geometry.toward(found.normals, sides)
             return discs(normals, found.radii, local)
 

@@ -21,7 +21,7 @@ class SurfaceVariation(Tool):
 
         def compute(progress):
             laplacian = operator(progress)
-            return cache.result(laplacian, "variation", compute=lambda: core.surface_variation(laplacian))
+            return cache.result(laplacian, "variation", compute=lambda: core.measure.surface_variation(laplacian))
 
         return compute
 

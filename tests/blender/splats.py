@@ -19,7 +19,7 @@ def bar_splats(core, degree=3):
     rotations = core.splats.ellipsoids.quaternions_of(np.moveaxis(frames, 0, 2))
     rng = np.random.default_rng(7)
     count = len(points)
-    return core.Splats(
+    return core.splats.Splats(
         positions=points.astype(np.float32),
         scales=(spacing[:, None] * [0.9, 0.7, 0.1]).astype(np.float32),
         rotations=rotations.astype(np.float32),
@@ -78,4 +78,4 @@ def splats_of(core, data):
     harmonics = [read(data, name) for name in names if name in data.attributes]
     harmonics = np.stack(harmonics, axis=1) if harmonics else np.empty((len(base), 0, 3), np.float32)
     rest = read(data, "position"), read(data, "scale"), read(data, "rotation"), base[:, 3], base[:, :3]
-    return core.Splats(*rest, harmonics)
+    return core.splats.Splats(*rest, harmonics)

@@ -24,7 +24,7 @@ def expected(core, obj):
         "lb_doubt": laplacian.doubt,
         "lb_disc": normals / np.linalg.norm(normals, axis=1)[:, None] * (laplacian.cell_radius / spacing)[:, None],
         "lb_gaussian_curvature": laplacian.gaussian_curvature,
-        "lb_mean_curvature": core.mean_curvature(laplacian),
+        "lb_mean_curvature": core.measure.mean_curvature(laplacian),
         "lb_normal": normals / np.linalg.norm(normals, axis=1)[:, None],
         "lb_trust": laplacian.trust,
     }

@@ -200,7 +200,7 @@ class TestShapeKeys:
     def test_a_new_key_adds_to_what_is_seen(self, obj, core):
         seen = shown_points(obj)
         bpy.ops.meshfree.smooth()
-        expected = core.clean_points(core.build_laplacian(seen))
+        expected = core.clean.clean_points(core.build_laplacian(seen))
         np.testing.assert_allclose(shown_points(obj), expected, atol=2e-5)
 
     @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ TURN = [[0.0, -1.0, 0.0, 1.0], [1.0, 0.0, 0.0, 2.0], [0.0, 0.0, 1.0, 3.0], [0.0,
 @pytest.fixture
 def bar(core, tmp_path):
     path = tmp_path / "bar.ply"
-    core.write_splats(path, bar_splats(core))
+    core.splats.write_splats(path, bar_splats(core))
     return path
 
 
@@ -29,7 +29,7 @@ def handles(folder, **wanted):
 
 def test_info_of_splats(core, run, bar):  # noqa: F811
     code, [line] = run("splat-info", bar)
-    splats = core.read_splats(bar)
+    splats = core.splats.read_splats(bar)
     assert code == 0
     assert (line["splats"], line["degree"], line["flat"]) == (len(splats), 3, 1.0)
     np.testing.assert_allclose(line["high"], splats.positions.max(axis=0))
@@ -40,7 +40,7 @@ def test_splats_are_turned_with_their_handles(core, run, bar, tmp_path):  # noqa
     wanted = handles(tmp_path, handles=[{**TOP, "matrix": TURN}, {**LOW, "matrix": TURN}])
     code, [line] = run("deform", bar, "--handles", wanted, "--out", tmp_path / "out.ply")
     assert code == 0, line
-    before, after = core.read_splats(bar), core.read_splats(tmp_path / "out.ply")
+    before, after = core.splats.read_splats(bar), core.splats.read_splats(tmp_path / "out.ply")
     matrix = np.array(TURN)
     moved = before.deformed(
         before.positions @ matrix[:3, :3].T + matrix[:3, 3], np.tile(matrix[:3, :3], (len(before), 1, 1))
@@ -51,20 +51,22 @@ def test_splats_are_turned_with_their_handles(core, run, bar, tmp_path):  # noqa
 
 
 def test_floaters_go_with_the_splats_next_to_them(core, run, bar, tmp_path):  # noqa: F811
-    splats = core.read_splats(bar)
+    splats = core.splats.read_splats(bar)
     opacities, positions = splats.opacities.copy(), splats.positions.copy()
     rows = np.argsort(np.abs(positions[:, 2] - 9.0))[:3]
     opacities[rows] = 0.01
     positions[rows, :2] *= 3.0  # off the surface
     given = tmp_path / "given.ply"
-    core.write_splats(given, core.Splats(**{**vars(splats), "opacities": opacities, "positions": positions}))
+    core.splats.write_splats(
+        given, core.splats.Splats(**{**vars(splats), "opacities": opacities, "positions": positions})
+    )
     wanted = handles(tmp_path, handles=[{**TOP, "shift": [0.0, 0.0, 2.0]}], anchors=[LOW])
     code, [line] = run("deform", given, "--handles", wanted, "--out", tmp_path / "out.ply")
     assert code == 0, line
     assert line["left_out"] == 3
-    moved = core.read_splats(tmp_path / "out.ply").positions
+    moved = core.splats.read_splats(tmp_path / "out.ply").positions
     near = np.argsort(np.linalg.norm(splats.positions - splats.positions[rows[0]], axis=1))[1:6]
-    shifts = moved - core.read_splats(given).positions
+    shifts = moved - core.splats.read_splats(given).positions
     np.testing.assert_allclose(shifts[rows[0]], shifts[near].mean(axis=0), atol=0.3)
 
 
@@ -130,15 +132,15 @@ def test_files_that_are_missing_or_no_splats_are_told(run, bar, tmp_path):  # no
 
 def test_tools_take_splats_of_a_file_as_such(core, run, bar, tmp_path):  # noqa: F811
     """Floaters are left out, ellipsoids go along, and results stand beside the columns of the file."""
-    splats = core.read_splats(bar)
+    splats = core.splats.read_splats(bar)
     opacities = splats.opacities.copy()
     opacities[[3, 700]] = 0.01
     given, out = tmp_path / "given.ply", tmp_path / "out.ply"
-    core.write_splats(given, core.Splats(**{**vars(splats), "opacities": opacities}))
+    core.splats.write_splats(given, core.splats.Splats(**{**vars(splats), "opacities": opacities}))
     code, [line] = run("analyze", given, "--out", out)
     assert code == 0, line
     assert line["left_out_count"] == 2
-    columns, before = core.read_splats(out).file.columns, core.read_splats(given).file.columns
+    columns, before = core.splats.read_splats(out).file.columns, core.splats.read_splats(given).file.columns
     assert all((columns[name] == values).all() for name, values in before.items())
     np.testing.assert_allclose(columns["lb_area"].sum(), line["total_area"], rtol=1e-5)
     assert {"lb_normal_x", "lb_normal_y", "lb_normal_z"} <= set(columns)
@@ -146,7 +148,7 @@ def test_tools_take_splats_of_a_file_as_such(core, run, bar, tmp_path):  # noqa:
 
     code, [line] = run("smooth", given, "--out", out)
     assert code == 0, line
-    before, after = core.read_splats(given), core.read_splats(out)
+    before, after = core.splats.read_splats(given), core.splats.read_splats(out)
     assert list(after.file.columns) == list(before.file.columns)
     assert np.abs(after.positions - before.positions).max() > 1e-4
     assert np.abs(after.covariances - before.covariances).max() > 1e-6

@@ -55,10 +55,10 @@ def test_values_at_the_subset_are_those_of_its_operator_and_others_take_theirs_f
     obj = limited(np.concatenate([bowl, bowl + [3.0, 0.0, 0.0]]))
     bpy.ops.meshfree.analyze()
     points = local_points(obj)
-    subset = core.blue_noise_subset(points, 1000)
+    subset = core.clean.blue_noise_subset(points, 1000)
     laplacian = core.build_laplacian(points[subset])
-    built = SimpleNamespace(laplacian=laplacian, mean_curvature=core.mean_curvature(laplacian))
-    nearest = core.Prolongation(points, subset, laplacian.normals, laplacian.component).nearest
+    built = SimpleNamespace(laplacian=laplacian, mean_curvature=core.measure.mean_curvature(laplacian))
+    nearest = core.clean.Prolongation(points, subset, laplacian.normals, laplacian.component).nearest
     assert obj.meshfree.subset_count == len(subset)
     for row in rows_of("analyze"):
         values, known = attribute(obj, row.attribute), row.of(built)

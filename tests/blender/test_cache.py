@@ -209,7 +209,7 @@ class TestMemory:
 
     def test_factors_count(self, cache, core):
         laplacian = core.build_laplacian(sphere_points(500))
-        deformer = core.Deformer(laplacian, [0], [1])
+        deformer = core.deform.Deformer(laplacian, [0], [1])
         assert cache.memory(deformer._solve) > 12 * 500
         assert cache.memory(deformer) > cache.memory(deformer._solve)
 

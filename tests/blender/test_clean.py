@@ -40,7 +40,7 @@ def test_they_are_shown_with_number_and_share_as_core_finds_them(kind):
     obj = add_cloud(kind)
     obj.scale = (2.0, 2.0, 2.0)
     assert bpy.ops.meshfree.stray_points() == {"FINISHED"}
-    np.testing.assert_array_equal(attribute(obj, "lb_stray"), core.stray_points(POINTS))
+    np.testing.assert_array_equal(attribute(obj, "lb_stray"), core.clean.stray_points(POINTS))
     np.testing.assert_array_equal(attribute(obj, "lb_stray"), IS_STRAY)
     assert [notice.text for notice in obj.meshfree.notices] == [f"{obj.name}: 11 of 611 points are stray (1.80%)"]
     assert any("Display" in modifier.name or modifier.type == "NODES" for modifier in obj.modifiers)
@@ -49,7 +49,7 @@ def test_they_are_shown_with_number_and_share_as_core_finds_them(kind):
 
 def test_settings_reach_core():
     obj = add_cloud(points=np.concatenate([SPHERE, 0.3 * sphere_points(60) + [3.0, 0.0, 0.0], [[0.0, 0.0, 1.25]]]))
-    strays = core.Strays(local_points(obj))
+    strays = core.clean.Strays(local_points(obj))
     for settings in ({"strictness": 5.0}, {"strictness": 0.2}, {"smallest": 61}, {"smallest_area": 2.0}, {}):
         bpy.ops.meshfree.stray_points(**settings)
         strictness = settings.get("strictness", 1.0)
@@ -187,7 +187,7 @@ def test_thinned_points_are_those_of_core_with_what_they_hold(kind):
     obj = add_cloud(kind, SPHERE)
     obj.scale = (2.0, 2.0, 2.0)
     assert bpy.ops.meshfree.thin_out(spacing=0.6) == {"FINISHED"}
-    np.testing.assert_array_equal(attribute(obj, "number"), core.thin_out(SPHERE, spacing=0.3))
+    np.testing.assert_array_equal(attribute(obj, "number"), core.clean.thin_out(SPHERE, spacing=0.3))
     count = len(attribute(obj, "number"))
     assert obj.meshfree.notices[0].text == f"{obj.name}: {count} of 600 points are left, at least 60 cm from each other"
 

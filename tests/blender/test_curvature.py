@@ -23,7 +23,9 @@ def ellipsoid():
 def test_attributes_are_what_core_computes_in_the_world(ellipsoid, core):
     assert bpy.ops.meshfree.principal_curvatures() == {"FINISHED"}
     turn = np.array(ellipsoid.matrix_world)[:3, :3]
-    found = core.principal_curvatures(core.build_laplacian(attribute(ellipsoid, "position").astype(float) @ turn.T))
+    found = core.measure.principal_curvatures(
+        core.build_laplacian(attribute(ellipsoid, "position").astype(float) @ turn.T)
+    )
     values = found.first, found.second, found.direction, found.shape_index, found.curvedness
     expected = dict(zip(RESULTS, values, strict=True))
     placed = attribute(ellipsoid, "lb_direction_1") @ turn.T

@@ -117,7 +117,7 @@ class TestFollowing:
         lift(bind(), 0.7)
         handles, anchors = is_end(before), before[:, 0] < 0.25
         laplacian = core.build_laplacian(before)
-        deformer = core.Deformer(laplacian, np.flatnonzero(handles), np.flatnonzero(anchors))
+        deformer = core.deform.Deformer(laplacian, np.flatnonzero(handles), np.flatnonzero(anchors))
         assert_allclose(shown_points(strip), deformer.solve(before[handles] + (0.0, 0.0, 0.7)), atol=1e-4)
 
     def test_several_handles_each_with_its_empty(self, strip):
@@ -253,7 +253,7 @@ class TestManyPoints:
     @pytest.fixture(autouse=True)
     def few(self, core, live, monkeypatch):
         """Take a strip for many points."""
-        monkeypatch.setattr(core, "coarse_deformer", functools.partial(core.coarse_deformer, count=300))
+        monkeypatch.setattr(core.deform, "coarse_deformer", functools.partial(core.deform.coarse_deformer, count=300))
 
     @pytest.fixture
     def unattended(self, live):
@@ -278,7 +278,7 @@ class TestManyPoints:
     def expected(self, core, points):
         """What all points do when the handles go up by 0.7."""
         laplacian = core.build_laplacian(points)
-        deformer = core.Deformer(laplacian, is_end(points), points[:, 0] < 0.25)
+        deformer = core.deform.Deformer(laplacian, is_end(points), points[:, 0] < 0.25)
         return deformer.solve(points[deformer.handles] + (0.0, 0.0, 0.7)) - points
 
     def test_roughly_while_dragged_and_exactly_at_rest(self, core, live, strip, unattended):

@@ -74,7 +74,7 @@ def cloud(count=300):
     rotations = rng.standard_normal((count, 4))
     rotations /= np.linalg.norm(rotations, axis=1, keepdims=True)
     return add_splats(
-        part("core").Splats(
+        part("core").splats.Splats(
             points.astype(np.float32),
             size.astype(np.float32),
             rotations.astype(np.float32),
@@ -232,7 +232,7 @@ class TestSplats:
             np.array(bone.matrix @ bone.bone.matrix_local.inverted(), np.float64) for bone in armature.pose.bones
         ]
         weights = part("operators.rigging.weights").read_weights(obj)
-        points, gradients = core.skin(rest(obj), weights, changes, gradients=True)
+        points, gradients = core.rig.skin(rest(obj), weights, changes, gradients=True)
         assert_allclose(shown(obj), points, atol=1e-5)
         assert_allclose(covariances(obj), gradients @ before @ gradients.transpose(0, 2, 1), atol=1e-5 * before.max())
 
@@ -579,7 +579,7 @@ class TestMeshes:
         pose(armature, "Bone.1")
         changes = [np.array(bone.matrix @ bone.bone.matrix_local.inverted()) for bone in armature.pose.bones]
         weights = part("operators.rigging.weights").read_weights(obj)
-        points, gradients = core.skin(rest(obj), weights, changes, gradients=True)
+        points, gradients = core.rig.skin(rest(obj), weights, changes, gradients=True)
         assert not attribute(obj, "lb_displacement").any()
         turned = part("operators.objects.carried").moved_discs(discs, gradients)
         assert_allclose(attribute(obj, "lb_moved_disc"), turned, atol=1e-6)

@@ -209,7 +209,7 @@ def two_files(core, tmp_path):
 
 def bar_files(core, tmp_path):
     """Regular ones, of which many stand above each other."""
-    core.write_splats(tmp_path / "bar.ply", bar_splats(core))
+    core.splats.write_splats(tmp_path / "bar.ply", bar_splats(core))
     return [imported(tmp_path / "bar.ply") for _ in range(2)]
 
 
@@ -270,7 +270,7 @@ class TestBlendersOwnJoin:
         assert not told()
 
     def test_a_deformation_leaves_nothing_to_tell(self, core, tmp_path, told):
-        core.write_splats(tmp_path / "bar.ply", bar_splats(core))
+        core.splats.write_splats(tmp_path / "bar.ply", bar_splats(core))
         imported(tmp_path / "bar.ply")
         assert bpy.ops.meshfree.smooth(target="IN_PLACE") == {"FINISHED"}
         assert not told()

@@ -74,7 +74,7 @@ def folder(core, run, tmp_path, monkeypatch):  # noqa: F811
     bar = bar_splats(core)
     small = replace(bar, positions=np.float32(0.4 * bar.positions), scales=np.float32(0.4 * bar.scales))
     for name in ("guitar", "a", "b"):
-        core.write_splats(tmp_path / f"{name}.ply", small)
+        core.splats.write_splats(tmp_path / f"{name}.ply", small)
     add_armature({"Bone": ((0.0, 0.0, 0.0), (0.0, 0.0, 0.8))})
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "rig.blend"))
     new_file()

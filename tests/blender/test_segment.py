@@ -75,7 +75,7 @@ def test_signatures(core, dumbbell, kind):
     names = [f"lb_{kind.lower()}_signature_{number:03d}" for number in range(1, 6)]
     assert [name for name in result_names(dumbbell) if "signature" in name] == names
     laplacian = core.build_laplacian(local_points(dumbbell))
-    signature = getattr(core, f"{kind.lower()}_kernel_signature")(laplacian.eigenpairs(20), count=5)
+    signature = getattr(core.spectral, f"{kind.lower()}_kernel_signature")(laplacian.eigenpairs(20), count=5)
     for name, values in zip(names, signature.T, strict=True):
         np.testing.assert_allclose(attribute(dumbbell, name), values, rtol=1e-3)
     bpy.ops.meshfree.signature(kind=kind, count=2, modes=20)

@@ -36,8 +36,8 @@ def laplacian_of(core, obj):
 def test_frames_of_heat_are_those_of_core(cloud, core):
     assert bpy.ops.meshfree.simulate(kind="HEAT", distance=1.5, width=0.5) == {"FINISHED"}
     laplacian = laplacian_of(core, cloud)
-    heat = core.Heat(laplacian, (0.5 * 1.5) ** 2 / (FRAMES - 1))
-    state = np.exp(-((core.geodesic_distance(laplacian, [7]) / 0.5) ** 2))
+    heat = core.motion.Heat(laplacian, (0.5 * 1.5) ** 2 / (FRAMES - 1))
+    state = np.exp(-((core.distance.geodesic_distance(laplacian, [7]) / 0.5) ** 2))
     for row in frames(cloud):
         assert_allclose(row, state, atol=1e-6)
         state = heat.advance(state)
@@ -56,7 +56,7 @@ def test_the_frame_of_the_scene_is_played(cloud):
 
 def test_a_front_travels_over_the_geodesic_distance(cloud, core):
     bpy.ops.meshfree.simulate(kind="FRONT", width=0.2)
-    distance = core.geodesic_distance(laplacian_of(core, cloud), [7])
+    distance = core.distance.geodesic_distance(laplacian_of(core, cloud), [7])
     for number, row in enumerate(frames(cloud)):
         travelled = distance.max() * number / (FRAMES - 1)
         assert_allclose(row, np.clip(1.0 + (travelled - distance) / 0.2, 0.0, 1.0), atol=1e-5)
@@ -198,12 +198,12 @@ def test_modes_are_the_formula_of_core_at_any_frame(cloud, core, kind):
     assert cloud.meshfree.motion_file == ""
     laplacian = laplacian_of(core, cloud)
     pairs, areas = laplacian.eigenpairs(20), laplacian.areas
-    pulse = np.exp(-((core.geodesic_distance(laplacian, [7]) / 0.8) ** 2))
-    wave = core.wave_modes(pairs, areas, pulse, 0.0, speed=2.0)
+    pulse = np.exp(-((core.distance.geodesic_distance(laplacian, [7]) / 0.8) ** 2))
+    wave = core.motion.wave_modes(pairs, areas, pulse, 0.0, speed=2.0)
     for frame in (9, 3, 2 + FRAMES, 1):
         bpy.context.scene.frame_set(frame)
         time = max(frame - 3, 0) / (FRAMES - 1)
-        heat = core.spectral_filter(pulse, pairs, areas, lambda values, time=time: np.exp(-time * values))
+        heat = core.clean.spectral_filter(pulse, pairs, areas, lambda values, time=time: np.exp(-time * values))
         assert_allclose(evaluated_motion(cloud), heat if kind == "HEAT" else wave(time), atol=2e-4)
 
 

@@ -45,7 +45,7 @@ def test_smoothing_is_that_of_core(core, target):
     obj = add_object(rough_sphere())
     before = local_points(obj)
     assert bpy.ops.meshfree.smooth(target=target) == {"FINISHED"}
-    expected = core.clean_points(core.build_laplacian(before))
+    expected = core.clean.clean_points(core.build_laplacian(before))
     if target == "IN_PLACE":
         assert_allclose(local_points(obj), expected, atol=1e-6)
         assert obj.data.shape_keys is None

@@ -159,7 +159,7 @@ def test_slopes_follow_the_values_and_the_points(obj):
 
 def test_settings_of_colors_compute_no_slopes_anew(core, obj, monkeypatch):
     show(obj, "height")
-    monkeypatch.setattr(core.Slopes, "of", None)
+    monkeypatch.setattr(core.measure.Slopes, "of", None)
     obj.meshfree.reverse, obj.meshfree.iso_lines, obj.meshfree.shaded = True, 7, 1.0
     assert rise(obj) is not None
 

@@ -57,9 +57,9 @@ def test_fewer_modes_remove_the_surplus(obj):
 def test_repeating_re_uses_the_operator(core, obj, monkeypatch):
     cache = part("operators.running.cache")
     built, curved = [], []
-    build, curve = core.build_laplacian, core.measure_mean_curvature
+    build, curve = core.build_laplacian, core.measure.measure_mean_curvature
     monkeypatch.setattr(core, "build_laplacian", lambda *args, **rest: built.append(1) or build(*args, **rest))
-    monkeypatch.setattr(core, "measure_mean_curvature", lambda laplacian: curved.append(1) or curve(laplacian))
+    monkeypatch.setattr(core.measure, "measure_mean_curvature", lambda laplacian: curved.append(1) or curve(laplacian))
     cache.clear()
     bpy.ops.meshfree.analyze()
     bpy.ops.meshfree.spectrum(count=2)

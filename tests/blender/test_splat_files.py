@@ -24,7 +24,7 @@ def imported(path, **settings):
 
 def exported(core, path, **settings):
     assert bpy.ops.meshfree.export_splats(filepath=str(path), **settings) == {"FINISHED"}
-    return core.read_splats(path)
+    return core.splats.read_splats(path)
 
 
 KINDS = {"a.splat": splat_files.make_splat, "a.spz": splat_files.make_spz, "a.ply": splat_files.make_packed}
@@ -33,7 +33,7 @@ KINDS = {"a.splat": splat_files.make_splat, "a.spz": splat_files.make_spz, "a.pl
 @pytest.mark.parametrize("name", KINDS)
 def test_other_kinds_become_splats_and_are_written_as_ply(core, tmp_path, name):
     (tmp_path / name).write_bytes(KINDS[name](splat_files.some_columns(300)))
-    wanted = core.read_splats(tmp_path / name)
+    wanted = core.splats.read_splats(tmp_path / name)
     obj = imported(tmp_path / name)
     np.testing.assert_array_equal(read(obj.data, "scale"), wanted.scales.astype(np.float32))
     found = exported(core, tmp_path / "back.ply")
@@ -73,7 +73,7 @@ def test_the_command_line_takes_them_as_splats(core, run, tmp_path):  # noqa: F8
     assert (code, line["splats"], line["degree"]) == (0, 300, 1)
     code, [line] = run("geodesic-distance", tmp_path / "a.spz", "--at", "0,0,0", "--out", tmp_path / "out.ply")
     assert code == 0, line
-    assert "lb_distance" in core.read_splats(tmp_path / "out.ply").file.columns
+    assert "lb_distance" in core.splats.read_splats(tmp_path / "out.ply").file.columns
 
 
 class TestFarAway:

@@ -84,7 +84,7 @@ def test_a_bent_bar_is_carried_as_core_does_it(core, rest):
     assert bpy.ops.meshfree.deform_update() == {"FINISHED"}
     found = splats_of(core, shown(obj))
     laplacian = core.build_laplacian(rest.positions.astype(float))
-    gradients = core.Deformer(laplacian, *ends(rest.positions)).gradients(found.positions.astype(float))
+    gradients = core.deform.Deformer(laplacian, *ends(rest.positions)).gradients(found.positions.astype(float))
     close(found, rest.deformed(found.positions, gradients), 1e-4)
 
 
@@ -191,7 +191,7 @@ def test_smoothed_points_carry_their_splats(core, rest, name):
     found = splats_of(core, obj.data)
     assert np.abs(found.positions - rest.positions).max() > 1e-3
     laplacian = core.build_laplacian(rest.positions.astype(float))
-    wanted = rest.deformed(found.positions, core.deformation_gradients(laplacian, found.positions.astype(float)))
+    wanted = rest.deformed(found.positions, core.deform.deformation_gradients(laplacian, found.positions.astype(float)))
     close(found, wanted, 1e-4)
 
 
@@ -205,7 +205,7 @@ def test_points_that_are_no_splats_get_no_attributes_of_such(rest):
 
 
 def kept_in(core, rest, folder, name="given.ply"):
-    core.write_splats(folder / name, rest)
+    core.splats.write_splats(folder / name, rest)
     return folder / name
 
 
@@ -218,13 +218,13 @@ class TestFiles:
         obj = bpy.context.object
         assert obj.type == ("POINTCLOUD" if bpy.app.version >= (4, 5) else "MESH")
         assert obj.select_get()
-        close(splats_of(core, obj.data), core.read_splats(given))
+        close(splats_of(core, obj.data), core.splats.read_splats(given))
         assert bpy.ops.meshfree.export_splats(filepath=str(tmp_path / "again.ply")) == {"FINISHED"}
         assert (tmp_path / "again.ply").read_bytes() == given.read_bytes()
 
     def test_an_odd_file_comes_back_bit_for_bit(self, core, tmp_path):
         """Big end first, with normals, a column of its own and a comment."""
-        splats = core.read_splats(kept_in(core, bar_splats(core, 1), tmp_path))
+        splats = core.splats.read_splats(kept_in(core, bar_splats(core, 1), tmp_path))
         columns = {
             "nx": np.full(len(splats), 0.25, np.float32),
             **splats.file.columns,
@@ -241,7 +241,7 @@ class TestFiles:
         empty.location += Vector((0.0, 1.0, 0.5))
         bpy.ops.meshfree.deform_update()
         assert bpy.ops.meshfree.export_splats(filepath=str(tmp_path / "bent.ply")) == {"FINISHED"}
-        found = core.read_splats(tmp_path / "bent.ply")
+        found = core.splats.read_splats(tmp_path / "bent.ply")
         np.testing.assert_allclose(found.positions, read(shown(obj), "position"), atol=1e-6)
         assert np.abs(found.covariances - rest.covariances).max() > 1e-3
 
@@ -327,7 +327,7 @@ def corners(obj):
 def test_floaters_are_selected(core, rest):
     opacities = np.array(rest.opacities)
     opacities[[3, 700]] = 0.01
-    obj = add_splats(core.Splats(**{**vars(rest), "opacities": opacities}))
+    obj = add_splats(core.splats.Splats(**{**vars(rest), "opacities": opacities}))
     assert bpy.ops.meshfree.select_floaters() == {"FINISHED"}
     if obj.type == "MESH":
         chosen = [vertex.select for vertex in obj.data.vertices]
@@ -351,7 +351,7 @@ def test_floaters_are_left_out_by_themselves(core, rest, budget):
     faint = np.arange(0, len(points), 6)
     opacities[faint] = 0.01
     points[faint] += 0.3 * np.random.default_rng(1).standard_normal((len(faint), 3))  # thick, if they took part
-    obj = add_splats(core.Splats(**{**both, "positions": points.astype(np.float32)}))
+    obj = add_splats(core.splats.Splats(**{**both, "positions": points.astype(np.float32)}))
     obj.meshfree.point_budget, obj.meshfree.most_points = budget, 1000
     assert bpy.ops.meshfree.analyze() == {"FINISHED"}
     component, areas = (
@@ -362,7 +362,7 @@ def test_floaters_are_left_out_by_themselves(core, rest, budget):
     assert areas[component < 0].max() == 0.0
     alone = np.delete(points, faint, axis=0).astype(float)
     if budget == "NUMBER":
-        alone = alone[core.blue_noise_subset(alone, 1000)]
+        alone = alone[core.clean.blue_noise_subset(alone, 1000)]
     assert obj.meshfree.total_area == pytest.approx(core.build_laplacian(alone).areas.sum(), rel=1e-5)
     assert areas.sum() == pytest.approx(obj.meshfree.total_area, rel=1e-5)
 
@@ -370,7 +370,7 @@ def test_floaters_are_left_out_by_themselves(core, rest, budget):
 def test_an_operator_by_floaters_is_not_taken_for_one_by_others(core, rest):
     opacities = np.array(rest.opacities)
     opacities[[3, 700]] = 0.01
-    obj = add_splats(core.Splats(**{**vars(rest), "opacities": opacities}))
+    obj = add_splats(core.splats.Splats(**{**vars(rest), "opacities": opacities}))
     bpy.ops.meshfree.analyze()
     assert obj.meshfree.left_out_count == 2
     base = obj.data.attributes["radiance:base"].data
@@ -383,7 +383,7 @@ def test_an_operator_by_floaters_is_not_taken_for_one_by_others(core, rest):
 def test_floaters_take_part_where_that_is_chosen(result, core, rest):
     opacities = np.array(rest.opacities)
     opacities[[3, 700]] = 0.01
-    obj = add_splats(core.Splats(**{**vars(rest), "opacities": opacities}))
+    obj = add_splats(core.splats.Splats(**{**vars(rest), "opacities": opacities}))
     bpy.ops.meshfree.analyze()
     obj.meshfree.leave_out_floaters = False
     assert result.is_stale(obj)
@@ -406,12 +406,12 @@ def test_a_minimal_surface_carries_its_splats(core, rest):
     found = splats_of(core, obj.data)
     assert np.abs(found.positions - rest.positions).max() > 1e-2
     laplacian = core.build_laplacian(rest.positions.astype(float))
-    wanted = rest.deformed(found.positions, core.deformation_gradients(laplacian, found.positions.astype(float)))
+    wanted = rest.deformed(found.positions, core.deform.deformation_gradients(laplacian, found.positions.astype(float)))
     close(found, wanted, 1e-4)
 
 
 def test_splats_that_all_seem_to_float_take_part(core, rest):
-    obj = add_splats(core.Splats(**{**vars(rest), "opacities": np.full(len(rest), 0.01, np.float32)}))
+    obj = add_splats(core.splats.Splats(**{**vars(rest), "opacities": np.full(len(rest), 0.01, np.float32)}))
     bpy.ops.meshfree.analyze()
     assert obj.meshfree.left_out_count == 0
 

@@ -49,7 +49,7 @@ def sizes(obj):
 
 def test_discs_are_those_of_core_at_the_default_size(obj, core):
     bpy.ops.meshfree.show_surface()
-    radii = core.surface_discs(local_points(obj)).radii
+    radii = core.surface.surface_discs(local_points(obj)).radii
     assert_allclose(sizes(obj), 1.1 * radii / np.cos(np.pi / 6.0), rtol=1e-3)
 
 
@@ -57,7 +57,9 @@ def test_discs_keep_the_scale_of_the_object_out(obj, core):
     obj.scale = 2.0, 2.0, 2.0
     bpy.context.view_layer.update()
     bpy.ops.meshfree.show_surface()
-    assert_allclose(sizes(obj), 1.1 * core.surface_discs(local_points(obj)).radii / np.cos(np.pi / 6.0), rtol=1e-3)
+    assert_allclose(
+        sizes(obj), 1.1 * core.surface.surface_discs(local_points(obj)).radii / np.cos(np.pi / 6.0), rtol=1e-3
+    )
 
 
 def test_point_shape_and_point_size_answer_at_once(obj):
@@ -188,8 +190,8 @@ class TestDeformed:
         laplacian = core.build_laplacian(points)
         moved = points + attribute(obj, "lb_displacement")
         normals, radii = attribute(obj, "lb_disc").astype(float), np.linalg.norm(attribute(obj, "lb_disc"), axis=1)
-        gradients = core.deformation_gradients(laplacian, moved)
-        wanted = core.Discs(normals / radii[:, None], radii).deformed(gradients)
+        gradients = core.deform.deformation_gradients(laplacian, moved)
+        wanted = core.surface.Discs(normals / radii[:, None], radii).deformed(gradients)
         found = attribute(obj, "lb_moved_disc")
         sizes = np.linalg.norm(found, axis=1)
         assert np.median(np.einsum("ij,ij->i", found / sizes[:, None], wanted.normals)) > 0.999

@@ -53,7 +53,7 @@ def test_a_front_arrives_from_the_touch_that_is_first(cloud, core):  # noqa: F81
     add_ball({5: 1.0, 9: -1.0})
     bpy.ops.meshfree.simulate(kind="FRONT", toucher="Ball", width=0.3, distance=2.0)
     laplacian, speed = laplacian_of(core, cloud), 2.0 / (FRAMES - 1)
-    distances = [core.geodesic_distance(laplacian, [end]) for end in ends(cloud)]
+    distances = [core.distance.geodesic_distance(laplacian, [end]) for end in ends(cloud)]
     for number, row in enumerate(frames(cloud)):
         arrivals = [began * speed + away for began, away in zip((2, 6), distances, strict=True) if began <= number]
         arrival = np.min(arrivals, axis=0) if arrivals else np.inf
@@ -64,7 +64,7 @@ def test_a_front_arrives_from_the_touch_that_is_first(cloud, core):  # noqa: F81
 def test_what_stays_where_it_is_starts_one_front(cloud, core):  # noqa: F811
     add_ball(dict.fromkeys(range(3, 3 + FRAMES), 1.0))
     bpy.ops.meshfree.simulate(kind="FRONT", toucher="Ball", width=0.3, distance=3.3)
-    distance = core.geodesic_distance(laplacian_of(core, cloud), [ends(cloud)[0]])
+    distance = core.distance.geodesic_distance(laplacian_of(core, cloud), [ends(cloud)[0]])
     assert_allclose(frames(cloud)[6], np.clip(1.0 + (3.3 * 6 / 11 - distance) / 0.3, 0.0, 1.0), atol=1e-5)
 
 

@@ -127,11 +127,8 @@ def test_light_parts_of_core_import_no_scipy():
 def test_what_is_taken_from_core_is_public_or_listed_by_a_package():
     names = {name[1:] for path in BLENDER_SIDE for name in taken(path)}
     assert len(names) > 40
-    lists = {
-        package: {name.split(".")[-1] for name in imported(ROOT / "core" / package / "__init__.py")}
-        for package in BELOW
-    }
-    assert names <= {*core.__all__, *(f"{package}.{name}" for package, names in lists.items() for name in names)}
+    lists = {package: core._read(f"{package}/__init__.py") for package in BELOW}
+    assert names <= {*core.__all__, *(f"{package}.{name}" for package, listed in lists.items() for name in listed)}
 
 
 @pytest.mark.parametrize("call", [r"\blayout\b", r"\bdef draw", r"\bbpy\.ops\.meshfree\."])
@@ -157,7 +154,7 @@ TOPICS = {  # what the operator is for, and the other topics that each truly bui
     "clean": (),
     "deform": (),
     "distance": (),
-    "measure": ("deform", "distance", "surface"),
+    "measure": ("distance", "surface"),
     "motion": (),
     "rig": ("motion",),
     "spectral": (),
@@ -213,13 +210,13 @@ def test_a_package_lists_only_what_others_use():
     """The names are those that another package, the public calls, or Blender's side take from it."""
     for package in ("algebra", "geometry", "operator"):
         listed = {name.rpartition(".")[2] for name in imported(ROOT / "core" / package / "__init__.py")}
-        above = [path for other in BELOW for path in modules_of(other)]
-        used = {name.rpartition(".")[2] for path in above for name in imported(path) if f".{package}." in name}
+        above = [path for other in BELOW for path in (ROOT / "core" / other).glob("*.py")]
+        used = {name.rpartition(".")[2] for path in above for name in imported(path) if f"..{package}." in name}
         outside = {name.removeprefix(f".{package}.") for path in BLENDER_SIDE for name in taken(path)}
         assert listed == used | {name for name in core.__all__ if core._HOMES[name] == package} | (outside & listed)
 
 
-@pytest.mark.parametrize("package", ["files", "paper", "splats", "tiles"])
+@pytest.mark.parametrize("package", core._NAMESPACES)
 def test_public_packages_name_what_they_export_as_type_checkers_ask_for_it(package):
     tree = ast.parse((ROOT / "core" / package / "__init__.py").read_text(encoding="utf-8"))
     names = [alias for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) for alias in node.names]
@@ -252,9 +249,25 @@ def test_public_names_are_what_their_modules_hold():
     assert set(core.__all__) <= set(dir(core))
     for name in core.__all__:
         assert getattr(core, name).__module__.startswith("core."), name
-    assert {"files", "paper", "splats", "tiles", "__version__"} <= set(dir(core))
+    assert len(core.__all__) < 30
+    assert {*TOPICS, "files", "paper", "splats", "tiles", "__version__"} <= set(dir(core))
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         core.nothing  # noqa: B018
+    with pytest.raises(AttributeError, match=r"^`mf.geodesic_distance` is `mf.distance.geodesic_distance`$"):
+        core.geodesic_distance  # noqa: B018
+
+
+def test_the_page_of_namespaces_names_what_they_give():
+    page = (ROOT / "docs" / "scripts.md").read_text(encoding="utf-8")
+    rows = dict(re.findall(r"^\| `mf\.(\w+)` \|.*\| (.*) \|$", page, re.MULTILINE))
+    assert rows.keys() == set(core._NAMESPACES)
+    for space, names in rows.items():
+        assert set(re.findall(r"`(\w+)`", names)) <= core._read(f"{space}/__init__.py").keys()
+
+
+def test_a_name_is_given_by_one_namespace():
+    given = [*core.__all__, *(name for space in core._NAMESPACES for name in core._read(f"{space}/__init__.py"))]
+    assert {name for name in given if given.count(name) > 1} == {"build_laplacian"}  # the paper's own
 
 
 TOGETHER = """
@@ -263,7 +276,7 @@ found, start = [], threading.Barrier(8)
 def take(name):
     start.wait()
     found.append(getattr(core, name))
-names = ["segment", "Splats", "check_stability", "surface_discs", "build_laplacian", "floaters", "Deformer", "paper"]
+names = ["spectral", "splats", "tiles", "surface", "build_laplacian", "measure", "deform", "paper"]
 threads = [threading.Thread(target=take, args=[name]) for name in names]
 for thread in threads:
     thread.start()

@@ -18,6 +18,7 @@ from numpy.testing import assert_allclose
 import core
 from benchmarks.samplings import fibonacci_sphere, square_grid
 from core.clean.sizes import match_size
+from tests.public import PUBLIC as CALLABLE
 
 TIMES = int(os.environ.get("MESHFREE_CASES", "1"))
 pytestmark = pytest.mark.filterwarnings("error")
@@ -185,10 +186,10 @@ def check_structure(laplacian):
         assert np.isfinite(getattr(laplacian, name)).all(), name
     assert_allclose(np.linalg.norm(laplacian.normals, axis=1), 1.0, rtol=1e-9)
     assert 0.0 <= laplacian.trust.min() <= laplacian.trust.max() <= 1.0
-    assert np.isfinite(core.mean_curvature(laplacian)).all()
+    assert np.isfinite(core.measure.mean_curvature(laplacian)).all()
     constant = laplacian.apply(np.ones(len(areas)))[taken]
     assert np.abs(constant).max() <= 1e-7 * np.max(stiffness.diagonal()[taken] / areas[taken])
-    curvatures = core.principal_curvatures(laplacian)
+    curvatures = core.measure.principal_curvatures(laplacian)
     assert np.isfinite(curvatures.direction).all()
     assert np.abs(curvatures.shape_index).max() <= 1.0
 
@@ -279,12 +280,14 @@ def extent(laplacian):
 
 
 def carried(laplacian):
-    subset = core.blue_noise_subset(laplacian.points, len(laplacian.points) // 3)
-    return core.Prolongation(laplacian.points, subset, laplacian.normals[subset]).interpolate(laplacian.normals[subset])
+    subset = core.clean.blue_noise_subset(laplacian.points, len(laplacian.points) // 3)
+    return core.clean.Prolongation(laplacian.points, subset, laplacian.normals[subset]).interpolate(
+        laplacian.normals[subset]
+    )
 
 
 def distances(laplacian):
-    found = core.geodesic_distance(laplacian, [0, 1])
+    found = core.distance.geodesic_distance(laplacian, [0, 1])
     return np.where(np.isinf(found), 0.0, found)  # on other components
 
 
@@ -298,32 +301,38 @@ USES = {
     "modes": (-1, lambda on: spectrum(on).eigenvectors),
     "Dirichlet modes": (-1, lambda on: on.eigenpairs(5, raw=True, dirichlet=True).eigenvectors),
     "operator": (-1, lambda on: on.apply(on.points)),
-    "mean curvature": (-1, core.mean_curvature),
-    "curvature": (-1, lambda on: core.principal_curvatures(on).curvedness),
-    "roughness": (1, core.roughness),
-    "mesh": (1, lambda on: core.mesh_surface(on).vertices),
-    "deviation": (1, lambda on: core.surface_deviation(on.points, on.normals, on).distance),
-    "fair": (1, core.fair_points),
-    "fair inside": (1, lambda on: core.fair_points(on, dirichlet=True)),
-    "fair, area": (1, lambda on: core.fair_points(on, keep="area")),
-    "fair, volume": (1, lambda on: core.fair_points(on, keep="volume")),
-    "smooth": (1, lambda on: core.smooth_points(on, 8)),
-    "boost": (1, lambda on: core.smooth_points(on, core.boost(2.0, *(np.array([10.0, 300.0]) / extent(on) ** 2)))),
-    "parts": (0, lambda on: core.segment(on, on.component.max() + 3)),
-    "domains": (0, lambda on: core.nodal_domains(on.points[:, 0] - on.points[:, 0].mean(), on)),
-    "heat": (-2, lambda on: core.heat_kernel_signature(spectrum(on))),
-    "waves": (-2, lambda on: core.wave_kernel_signature(spectrum(on))),
-    "harmonic": (0, lambda on: core.harmonic_field(on, [0, 1, 2], [0.0, 1.0, 3.0])),
-    "harmonic height": (1, lambda on: core.harmonic_field(on, ends(on)[0], on.points[ends(on)[0], 2])),
-    "potential": (3, lambda on: core.solve_poisson(on, on.points[:, 2], [0], [0.0])),
+    "mean curvature": (-1, core.measure.mean_curvature),
+    "curvature": (-1, lambda on: core.measure.principal_curvatures(on).curvedness),
+    "roughness": (1, core.clean.roughness),
+    "mesh": (1, lambda on: core.surface.mesh_surface(on).vertices),
+    "deviation": (1, lambda on: core.measure.surface_deviation(on, on.points, on.normals).distance),
+    "fair": (1, core.clean.fair_points),
+    "fair inside": (1, lambda on: core.clean.fair_points(on, dirichlet=True)),
+    "fair, area": (1, lambda on: core.clean.fair_points(on, keep="area")),
+    "fair, volume": (1, lambda on: core.clean.fair_points(on, keep="volume")),
+    "smooth": (1, lambda on: core.clean.smooth_points(on, 8)),
+    "boost": (
+        1,
+        lambda on: core.clean.smooth_points(on, core.clean.boost(2.0, *(np.array([10.0, 300.0]) / extent(on) ** 2))),
+    ),
+    "parts": (0, lambda on: core.spectral.segment(on, on.component.max() + 3)),
+    "domains": (0, lambda on: core.spectral.nodal_domains(on, on.points[:, 0] - on.points[:, 0].mean())),
+    "heat": (-2, lambda on: core.spectral.heat_kernel_signature(spectrum(on))),
+    "waves": (-2, lambda on: core.spectral.wave_kernel_signature(spectrum(on))),
+    "harmonic": (0, lambda on: core.distance.harmonic_field(on, [0, 1, 2], [0.0, 1.0, 3.0])),
+    "harmonic height": (1, lambda on: core.distance.harmonic_field(on, ends(on)[0], on.points[ends(on)[0], 2])),
+    "potential": (3, lambda on: core.distance.solve_poisson(on, on.points[:, 2], [0], [0.0])),
     "distance": (1, distances),
-    "grown": (0, lambda on: core.grow(on, [0], 0.2 * extent(on))),
-    "displaced": (1, lambda on: core.displace_by_mode(on, on.points[:, 0] - on.points[:, 0].mean())),
-    "deformed": (1, lambda on: lifted(on, core.Deformer)),
-    "deformed coarsely": (1, lambda on: lifted(on, functools.partial(core.coarse_deformer, count=60, neighbors=12))),
-    "subset": (0, lambda on: core.blue_noise_subset(on.points, 30)),
+    "grown": (0, lambda on: core.distance.grow(on, [0], 0.2 * extent(on))),
+    "displaced": (1, lambda on: core.clean.displace_by_mode(on, on.points[:, 0] - on.points[:, 0].mean())),
+    "deformed": (1, lambda on: lifted(on, core.deform.Deformer)),
+    "deformed coarsely": (
+        1,
+        lambda on: lifted(on, functools.partial(core.deform.coarse_deformer, count=60, neighbors=12)),
+    ),
+    "subset": (0, lambda on: core.clean.blue_noise_subset(on.points, 30)),
     "carried": (0, carried),
-    "minimal": (1, lambda on: core.minimal_surface(on.points, on.boundary | ends(on)[0], max_steps=1).points),
+    "minimal": (1, lambda on: core.deform.minimal_surface(on.points, on.boundary | ends(on)[0], max_steps=1).points),
 }
 
 
@@ -402,119 +411,127 @@ def calls():
     yield core.build_laplacian, {"points": points}, {"boundary": top, "boundary_distance": np.full(n, np.inf)}
     yield core.estimate_areas, {}, {"points": points, "normals": points, "options": core.LaplacianOptions()}
     yield core.estimate_normals, {}, {"points": points, "options": core.LaplacianOptions()}
-    yield core.surface_discs, {}, {"points": points}
+    yield core.surface.surface_discs, {}, {"points": points}
     yield core.check_points, {}, {"points": points}
-    yield core.blue_noise_subset, {}, {"points": points, "count": 100}
-    yield core.Prolongation, {}, {"points": points, "subset": np.arange(150), "normals": points[:150]}
+    yield core.clean.blue_noise_subset, {}, {"points": points, "count": 100}
+    yield core.clean.Prolongation, {}, {"points": points, "subset": np.arange(150), "normals": points[:150]}
     yield laplacian.apply, {}, {"values": low, "raw": False}
     yield laplacian.eigenpairs, {}, {"count": 4, "raw": False, "dirichlet": False, "tolerance": 1e-6}
-    yield core.spectral_filter, of, {"values": low, "areas": laplacian.areas, "response": 3, "rest": 0.0}
+    yield core.clean.spectral_filter, of, {"values": low, "areas": laplacian.areas, "response": 3, "rest": 0.0}
     yield (
-        core.chebyshev_filter,
-        {**on, "response": core.exponential(0.1)},
+        core.clean.chebyshev_filter,
+        {**on, "response": core.clean.exponential(0.1)},
         {"values": low, "dirichlet": False, "raw": False, "tolerance": 1e-3},
     )
-    yield core.exponential, {}, {"time": 1.0}
-    yield core.fairing, {}, {"time": 1.0, "order": 2}
-    yield core.band, {}, {"low": 1.0, "high": 2.0, "softness": 0.1}
-    yield core.boost, {}, {"gain": 2.0, "low": 1.0, "high": 2.0, "softness": 0.1}
+    yield core.clean.exponential, {}, {"time": 1.0}
+    yield core.clean.fairing, {}, {"time": 1.0, "order": 2}
+    yield core.clean.band, {}, {"low": 1.0, "high": 2.0, "softness": 0.1}
+    yield core.clean.boost, {}, {"gain": 2.0, "low": 1.0, "high": 2.0, "softness": 0.1}
     yield (
-        core.smooth_points,
+        core.clean.smooth_points,
         {**on, "spectrum": spectrum},
         {"response": 5, "strength": 1.0, "mask": top, "keep": "area"},
     )
-    yield core.fair_points, on, {"time": 0.01, "order": 3, "dirichlet": False, "keep": None}
-    yield core.roughness, on, {"wavelength": 0.5}
-    yield core.mesh_surface, on, {"detail": 1.0}
-    yield core.values_on_mesh, on, {"vertices": points[:9]}
-    yield core.surface_deviation, on, {"points": points[:9], "normals": points[:9], "greatest": 1.0}
-    yield core.sides_beside, on, {"sides": low, "points": points[:9], "normals": points[:9]}
-    yield core.deformation_gradients, on, {"positions": points}
-    yield core.displace_by_mode, on, {"mode": low, "amplitude": 0.1, "phase": 0.0}
-    yield core.segment, {**on, **of}, {"parts": 2}
-    yield core.nodal_domains, on, {"values": low, "threshold": 0.02, "bridge": 0.1, "smallest": 5}
-    yield core.modes_needed, on, {"parts": 2}
-    yield core.heat_kernel_signature, of, {"times": [0.1, 1.0], "count": 3, "normalized": False}
-    yield core.wave_kernel_signature, of, {"energies": [0.1, 1.0], "count": 3}
-    yield core.signature_times, of, {"count": 3}
-    yield core.signature_energies, of, {"count": 3}
-    yield core.harmonic_field, on, {"fixed": [0, 299], "fixed_values": [0.0, 1.0]}
+    yield core.clean.fair_points, on, {"time": 0.01, "order": 3, "dirichlet": False, "keep": None}
+    yield core.clean.roughness, on, {"wavelength": 0.5}
+    yield core.surface.mesh_surface, on, {"detail": 1.0}
+    yield core.surface.values_on_mesh, on, {"vertices": points[:9]}
+    yield core.measure.surface_deviation, on, {"points": points[:9], "normals": points[:9], "greatest": 1.0}
+    yield core.measure.sides_beside, on, {"sides": low, "points": points[:9], "normals": points[:9]}
+    yield core.deform.deformation_gradients, on, {"positions": points}
+    yield core.clean.displace_by_mode, on, {"mode": low, "amplitude": 0.1, "phase": 0.0}
+    yield core.spectral.segment, {**on, **of}, {"parts": 2}
+    yield core.spectral.nodal_domains, on, {"values": low, "threshold": 0.02, "bridge": 0.1, "smallest": 5}
+    yield core.spectral.modes_needed, on, {"parts": 2}
+    yield core.spectral.heat_kernel_signature, of, {"times": [0.1, 1.0], "count": 3, "normalized": False}
+    yield core.spectral.wave_kernel_signature, of, {"energies": [0.1, 1.0], "count": 3}
+    yield core.spectral.signature_times, of, {"count": 3}
+    yield core.spectral.signature_energies, of, {"count": 3}
+    yield core.distance.harmonic_field, on, {"fixed": [0, 299], "fixed_values": [0.0, 1.0]}
     bones = {"heads": [[0.0, 0.0, -0.8], [0.0, 0.0, 0.0]], "tails": [[0.0, 0.0, 0.0], [0.0, 0.0, 0.8]]}
-    yield core.bone_weights, on, {**bones, "falloff": 1.0, "visible": True, "influences": 1, "least": 0.1}
-    yield core.nearest_bones, {}, {"points": points, **bones}
-    yield core.inpaint, on, {"known": [0, 299], "values": [0.0, 1.0], "biharmonic": True}
+    yield core.rig.bone_weights, on, {**bones, "falloff": 1.0, "visible": True, "influences": 1, "least": 0.1}
+    yield core.rig.nearest_bones, {}, {"points": points, **bones}
+    yield core.rig.inpaint, on, {"known": [0, 299], "values": [0.0, 1.0], "biharmonic": True}
     two = {"weights": np.ones((n, 2)), "length": 0.1, "edges": [[0, 1]], "least": 0.1, "influences": 1, "fill": True}
-    yield core.smooth_weights, on, {**two, "columns": [1], "locked": [0], "chosen": [3]}
-    yield core.inpaint_labels, on, {"known": [0, 299], "labels": [0, 1]}
-    match = core.match_surface(laplacian, laplacian)
-    yield core.match_surface, {"target": laplacian, "sources": laplacian}, {"distance": 1.0, "angle": 0.5}
-    yield core.transfer_values, {"target": laplacian, "match": match}, {"values": low}
-    yield core.transfer_labels, {"target": laplacian, "match": match}, {"labels": top}
-    yield core.mix_weights, {}, {"before": np.ones((9, 2)), "taken": np.ones((9, 2)), "mix": 0.5, "locked": [0]}
-    yield core.are_normalized, {}, {"weights": np.ones((9, 2))}
-    yield core.skin, {"gradients": False}, {"points": points, "weights": np.ones((n, 1)), "matrices": np.eye(4)[None]}
-    yield core.Skinner(np.ones((n, 1))).move, {"gradients": False}, {"points": points, "matrices": np.eye(4)[None]}
+    yield core.rig.smooth_weights, on, {**two, "columns": [1], "locked": [0], "chosen": [3]}
+    yield core.rig.inpaint_labels, on, {"known": [0, 299], "labels": [0, 1]}
+    match = core.rig.match_surface(laplacian, laplacian)
+    yield core.rig.match_surface, {"target": laplacian, "sources": laplacian}, {"distance": 1.0, "angle": 0.5}
+    yield core.rig.transfer_values, {"target": laplacian, "match": match}, {"values": low}
+    yield core.rig.transfer_labels, {"target": laplacian, "match": match}, {"labels": top}
+    yield core.rig.mix_weights, {}, {"before": np.ones((9, 2)), "taken": np.ones((9, 2)), "mix": 0.5, "locked": [0]}
+    yield core.rig.are_normalized, {}, {"weights": np.ones((9, 2))}
+    yield (
+        core.rig.skin,
+        {"gradients": False},
+        {"points": points, "weights": np.ones((n, 1)), "matrices": np.eye(4)[None]},
+    )
+    yield core.rig.Skinner(np.ones((n, 1))).move, {"gradients": False}, {"points": points, "matrices": np.eye(4)[None]}
     ends = {"heads": points, "tails": 2.0 * points, "head_radii": np.ones(n), "tail_radii": np.ones(n)}
-    yield core.envelope_share, {}, {"points": points, **ends, "distances": np.ones(n)}
-    yield core.solve_poisson, on, {"source": points[:, 2], "fixed": [0], "fixed_values": [0.0]}
-    yield core.geodesic_distance, on, {"sources": [0]}
-    yield core.falloff, {}, {"distance": points[:, 0] ** 2, "radius": 1.0, "shape": "sharp"}
-    yield core.Geodesics(laplacian).distance, {}, {"sources": [0]}
-    yield core.nearest_source, on, {"sources": [0, 150]}
-    yield core.signed_distance, on, {"curve": [100, 101, 102], "closed": True}
-    yield core.logarithmic_map, on, {"source": 0}
-    yield core.transport, on, {"sources": [0], "directions": [[1.0, 0.0, 0.0]]}
+    yield core.rig.envelope_share, {}, {"points": points, **ends, "distances": np.ones(n)}
+    yield core.distance.solve_poisson, on, {"source": points[:, 2], "fixed": [0], "fixed_values": [0.0]}
+    yield core.distance.geodesic_distance, on, {"sources": [0]}
+    yield core.distance.falloff, {}, {"distance": points[:, 0] ** 2, "radius": 1.0, "shape": "sharp"}
+    yield core.distance.Geodesics(laplacian).distance, {}, {"sources": [0]}
+    yield core.distance.nearest_source, on, {"sources": [0, 150]}
+    yield core.distance.signed_distance, on, {"curve": [100, 101, 102], "closed": True}
+    yield core.distance.logarithmic_map, on, {"source": 0}
+    yield core.distance.transport, on, {"sources": [0], "directions": [[1.0, 0.0, 0.0]]}
     yield core.orient_normals, {}, {"points": points, "normals": points, "method": "outside"}
     frame = {"spectrum": spectrum, "spectrum_before": spectrum}
     yield (
-        core.match_modes,
+        core.spectral.match_modes,
         frame,
         {"areas": laplacian.areas, "points": points, "points_before": points, "tolerance": 0.02},
     )
-    yield core.grow, on, {"chosen": [0], "distance": 0.3}
-    yield core.stray_points, {}, {"points": points, "strictness": 1.0, "smallest": 30, "smallest_area": 0.0}
-    yield core.thin_out, {}, {"points": points, "spacing": 0.2}
-    yield core.thin_out, {}, {"points": points, "count": 100, "keep_edges": False}
-    yield core.thin_pieces, {}, {"pieces": [(points, {})], "count": 100}
-    yield core.clean_points, on, {"keep_edges": True, "dirichlet": False}
-    yield core.measure_region, on, {"members": top}
-    yield core.geodesic_path, on, {"start": 0, "end": 150}
-    yield core.polygon_length, {}, {"corners": points[:9]}
-    yield core.measure_parts, on, {"labels": top.astype(int)}
-    yield core.part_means, on, {"values": low, "labels": top.astype(int)}
-    yield core.pile_volume, on, {"members": top}
-    yield core.cross_section, on, {"point": [0.0, 0.0, 0.1], "normal": [0.0, 1.0, 2.0]}
-    yield core.profile, on, {"path": points[:9], "values": low}
+    yield core.distance.grow, on, {"chosen": [0], "distance": 0.3}
+    yield core.clean.stray_points, {}, {"points": points, "strictness": 1.0, "smallest": 30, "smallest_area": 0.0}
+    yield core.clean.thin_out, {}, {"points": points, "spacing": 0.2}
+    yield core.clean.thin_out, {}, {"points": points, "count": 100, "keep_edges": False}
+    yield core.clean.thin_pieces, {}, {"pieces": [(points, {})], "count": 100}
+    yield core.clean.clean_points, on, {"keep_edges": True, "dirichlet": False}
+    yield core.measure.measure_region, on, {"members": top}
+    yield core.distance.geodesic_path, on, {"start": 0, "end": 150}
+    yield core.distance.polygon_length, {}, {"corners": points[:9]}
+    yield core.measure.measure_parts, on, {"labels": top.astype(int)}
+    yield core.measure.part_means, on, {"values": low, "labels": top.astype(int)}
+    yield core.measure.pile_volume, on, {"members": top}
+    yield core.measure.cross_section, on, {"point": [0.0, 0.0, 0.1], "normal": [0.0, 1.0, 2.0]}
+    yield core.measure.profile, on, {"path": points[:9], "values": low}
     turned = points[:, [1, 2, 0]]
-    yield core.align, {"points": points + 0.01}, {"target": points, "overlap": 0.9, "scale": True}
-    yield core.match_places, {}, {"places": points[:4], "others": turned[:4], "scale": True}
-    yield core.Heat, on, {"step": 0.1}
-    yield core.Heat(laplacian, 0.1).advance, {}, {"state": low}
-    yield core.Wave, on, {"step": 0.1, "speed": 1.0}
-    yield core.Wave(laplacian, 0.1).advance, {}, {"state": np.column_stack([low, low])}
-    yield core.ReactionDiffusion, on, {"step": 1.0, "feed": 0.04, "kill": 0.06, "rates": (1e-3, 5e-4)}
+    yield core.measure.align, {"points": points + 0.01}, {"target": points, "overlap": 0.9, "scale": True}
+    yield core.measure.match_places, {}, {"places": points[:4], "others": turned[:4], "scale": True}
+    yield core.motion.Heat, on, {"step": 0.1}
+    yield core.motion.Heat(laplacian, 0.1).advance, {}, {"state": low}
+    yield core.motion.Wave, on, {"step": 0.1, "speed": 1.0}
+    yield core.motion.Wave(laplacian, 0.1).advance, {}, {"state": np.column_stack([low, low])}
+    yield core.motion.ReactionDiffusion, on, {"step": 1.0, "feed": 0.04, "kill": 0.06, "rates": (1e-3, 5e-4)}
     yield (
-        core.wave_modes,
+        core.motion.wave_modes,
         of,
         {"areas": laplacian.areas, "displacement": low, "velocity": low, "speed": 1.0, "damping": 0.1},
     )
-    yield core.opposite_ends, on, {"share": 0.05}
-    yield core.front_point, {}, {"points": points, "eye": [0, 0, 5], "direction": [0, 0, -1], "reach": 0.1}
+    yield core.distance.opposite_ends, on, {"share": 0.05}
+    yield core.distance.front_point, {}, {"points": points, "eye": [0, 0, 5], "direction": [0, 0, -1], "reach": 0.1}
     corners = np.random.default_rng(0).integers(n, size=(40, 3))
-    yield core.iso_lines, {}, {"vertices": points, "faces": corners, "values": low, "levels": [0.0, 0.1]}
-    yield core.Slopes, {"discs": core.surface_discs(points)}, {"points": points}
-    yield core.Slopes(points, core.surface_discs(points)).of, {}, {"values": low}
+    yield core.measure.iso_lines, {}, {"vertices": points, "faces": corners, "values": low, "levels": [0.0, 0.1]}
+    yield core.measure.Slopes, {"discs": core.surface.surface_discs(points)}, {"points": points}
+    yield core.measure.Slopes(points, core.surface.surface_discs(points)).of, {}, {"values": low}
     yield (
-        core.Deformer,
+        core.deform.Deformer,
         on,
         {"handles": top, "anchors": bottom, "weights": None, "rotation_aware": True, "neighbors": 40},
     )
-    solve = core.Deformer(laplacian, top, bottom).solve
+    solve = core.deform.Deformer(laplacian, top, bottom).solve
     yield solve, {}, {"handle_positions": points[top], "steps": 3, "rtol": 1e-3, "start": None}
-    yield core.coarse_deformer, on, {"handles": top, "anchors": bottom, "count": 100}
-    yield core.coarse_deformer(laplacian, top, bottom).solve, {}, {"handle_positions": points[top]}
-    yield core.minimal_surface, {"max_steps": 2}, {"points": grid, "fixed": edge, "options": core.LaplacianOptions()}
-    yield core.minimal_surface, {"points": grid, "fixed": edge}, {"max_steps": 2, "epsilon": 1e-3}
+    yield core.deform.coarse_deformer, on, {"handles": top, "anchors": bottom, "count": 100}
+    yield core.deform.coarse_deformer(laplacian, top, bottom).solve, {}, {"handle_positions": points[top]}
+    yield (
+        core.deform.minimal_surface,
+        {"max_steps": 2},
+        {"points": grid, "fixed": edge, "options": core.LaplacianOptions()},
+    )
+    yield core.deform.minimal_surface, {"points": grid, "fixed": edge}, {"max_steps": 2, "epsilon": 1e-3}
 
 
 PUBLIC = list(calls())
@@ -524,7 +541,7 @@ ELSEWHERE = {"load", "save", "read_splats", "write_splats", "floaters", "check_r
 
 def test_all_public_functions_are_tried():
     tested = {function.__name__ for function, _, _ in PUBLIC}
-    functions = {name: getattr(core, name) for name in core.__all__ if inspect.isfunction(getattr(core, name))}
+    functions = {one.__name__: one for one in CALLABLE.values() if inspect.isfunction(one)}
     untried = [
         name for name, function in functions.items() if name not in tested | ELSEWHERE and takes_arrays(function)
     ]
@@ -551,7 +568,8 @@ def test_wrong_arguments_are_refused_in_words(function, fixed, arguments):
     [
         call
         for call in PUBLIC
-        if "progress" in inspect.signature(call[0]).parameters and call[0] is not core.smooth_points  # has modes here
+        if "progress" in inspect.signature(call[0]).parameters
+        and call[0] is not core.clean.smooth_points  # has modes here
     ],
 )
 def test_work_reports_how_far_it_is_and_may_be_stopped_at_any_report(function, fixed, arguments):
@@ -559,7 +577,7 @@ def test_work_reports_how_far_it_is_and_may_be_stopped_at_any_report(function, f
     function(**fixed, **arguments, progress=lambda *report: reports.append(report))
     assert all(0.0 <= fraction <= 1.0 for _, fraction in filter(None, reports))
     # Minimal surfaces return what they have.
-    for last in {0} if function is core.minimal_surface else {0, len(reports) // 2, len(reports) - 1}:
+    for last in {0} if function is core.deform.minimal_surface else {0, len(reports) // 2, len(reports) - 1}:
         left = iter(range(last))
 
         def stop(*report, left=left):
@@ -603,7 +621,7 @@ def test_masked_values_are_refused():
 def test_modes_and_filters_of_a_grid_are_the_same_in_huge_units():
     points, options = np.argwhere(np.ones((13, 13, 1))), core.LaplacianOptions(neighbors=20)
     before, after = (core.build_laplacian(unit * points, options=options) for unit in (1.0, 2.0**100))
-    np.testing.assert_array_equal(2.0**-100 * core.fair_points(after), core.fair_points(before))
+    np.testing.assert_array_equal(2.0**-100 * core.clean.fair_points(after), core.clean.fair_points(before))
     ours, theirs = before.eigenpairs(9, raw=True), after.eigenpairs(9, raw=True)
     assert_allclose(2.0**100 * theirs.eigenvectors, ours.eigenvectors, rtol=0.0, atol=1e-9)
 
@@ -613,7 +631,9 @@ def test_functions_are_carried_in_any_unit(unit):
     rng = np.random.default_rng(0)
     points, values = KINDS["islands"](rng, 90), rng.random(30)
     normals = sphere(rng, 30)
-    ours, theirs = (core.Prolongation(by * points, np.arange(30), normals).interpolate(values) for by in (1.0, unit))
+    ours, theirs = (
+        core.clean.Prolongation(by * points, np.arange(30), normals).interpolate(values) for by in (1.0, unit)
+    )
     np.testing.assert_array_equal(theirs, ours)
 
 

@@ -37,9 +37,9 @@ def noisy_cube():
 
 
 def test_edges_stay_where_smoothing_rounds_them(noisy_cube):
-    before, clean = rms(off_cube(noisy_cube.points)), rms(off_cube(core.clean_points(noisy_cube)))
+    before, clean = rms(off_cube(noisy_cube.points)), rms(off_cube(core.clean.clean_points(noisy_cube)))
     assert clean < 0.5 * before
-    assert clean < 0.65 * rms(off_cube(core.fair_points(noisy_cube)))
+    assert clean < 0.65 * rms(off_cube(core.clean.fair_points(noisy_cube)))
 
 
 PLATE, NOISE = np.array([30.0, 20.0, 1.0]), 0.1
@@ -67,7 +67,7 @@ def test_no_point_of_a_thin_plate_is_thrown_off_it(seed, twice):
     points = plate(seed)
     if twice:
         points = np.concatenate([points, points[:1500] + 1e-6 * np.random.default_rng(9).standard_normal((1500, 3))])
-    clean = core.clean_points(core.build_laplacian(points))
+    clean = core.clean.clean_points(core.build_laplacian(points))
     assert rms(off_plate(clean)) < 0.8 * rms(off_plate(points))
     assert np.linalg.norm(clean - points, axis=1).max() < 10.0 * NOISE
     assert np.mean(off_plate(clean) > off_plate(points) + 3.0 * NOISE) <= 1e-3
@@ -75,7 +75,7 @@ def test_no_point_of_a_thin_plate_is_thrown_off_it(seed, twice):
 
 def test_points_move_along_one_direction_each_whatever_the_rounds(noisy_cube):
     """Without edges the direction is the normal of the operator."""
-    moved = core.clean_points(noisy_cube, keep_edges=False) - noisy_cube.points
+    moved = core.clean.clean_points(noisy_cube, keep_edges=False) - noisy_cube.points
     across = moved - np.einsum("ij,ij->i", moved, noisy_cube.normals)[:, None] * noisy_cube.normals
     assert np.abs(moved).max() > 0.1 * SPACING
     np.testing.assert_allclose(across, 0.0, atol=1e-12)
@@ -84,22 +84,22 @@ def test_points_move_along_one_direction_each_whatever_the_rounds(noisy_cube):
 def test_a_sphere_without_noise_stays():
     """Circular arcs have no height over each other, though the sphere is curved."""
     points = fibonacci_sphere(1000)
-    clean = core.clean_points(core.build_laplacian(points), keep_edges=False)
+    clean = core.clean.clean_points(core.build_laplacian(points), keep_edges=False)
     np.testing.assert_allclose(clean, points, atol=2e-4)
-    assert rms(np.linalg.norm(core.clean_points(core.build_laplacian(points)), axis=1) - 1.0) < 1e-3
+    assert rms(np.linalg.norm(core.clean.clean_points(core.build_laplacian(points)), axis=1) - 1.0) < 1e-3
 
 
 def test_noise_of_a_sphere_shrinks_to_a_quarter():
     points = random_sphere(3000)
     spacing = np.sqrt(4.0 * np.pi / 3000)
-    clean = core.clean_points(core.build_laplacian(noisy(points, 0.5 * spacing)))
+    clean = core.clean.clean_points(core.build_laplacian(noisy(points, 0.5 * spacing)))
     assert rms(np.linalg.norm(clean, axis=1) - 1.0) < 0.125 * spacing
 
 
 def test_it_turns_moves_and_scales_with_the_points(noisy_cube):
     turn = np.array([[0.6, 0.0, 0.8], [0.0, 1.0, 0.0], [-0.8, 0.0, 0.6]])
-    other = core.clean_points(core.build_laplacian(3.0 * noisy_cube.points @ turn.T + [1.0, 2.0, 3.0]))
-    expected = 3.0 * core.clean_points(noisy_cube) @ turn.T + [1.0, 2.0, 3.0]
+    other = core.clean.clean_points(core.build_laplacian(3.0 * noisy_cube.points @ turn.T + [1.0, 2.0, 3.0]))
+    expected = 3.0 * core.clean.clean_points(noisy_cube) @ turn.T + [1.0, 2.0, 3.0]
     np.testing.assert_allclose(other, expected, atol=1e-5)
 
 
@@ -109,19 +109,19 @@ def test_boundary_points_and_those_left_out_stay():
     laplacian = core.build_laplacian(points)
     stay = laplacian.boundary | (laplacian.component < 0)
     assert 20 < stay.sum() < 200
-    moved = np.abs(core.clean_points(laplacian, dirichlet=True) - points).max(axis=1)
+    moved = np.abs(core.clean.clean_points(laplacian, dirichlet=True) - points).max(axis=1)
     assert np.all(moved[stay] == 0.0)
     assert np.count_nonzero(moved[~stay] == 0.0) == 0
-    assert np.abs(core.clean_points(laplacian) - points)[laplacian.boundary].max() > 0.0
+    assert np.abs(core.clean.clean_points(laplacian) - points)[laplacian.boundary].max() > 0.0
 
 
 def test_switches_are_checked_and_the_work_can_be_stopped(noisy_cube):
     with pytest.raises(core.PointCloudError, match="keep_edges"):
-        core.clean_points(noisy_cube, keep_edges=1)
+        core.clean.clean_points(noisy_cube, keep_edges=1)
 
     def progress(stage, share):
         if stage == "Heights":
             raise core.Cancelled
 
     with pytest.raises(core.Cancelled):
-        core.clean_points(noisy_cube, progress=progress)
+        core.clean.clean_points(noisy_cube, progress=progress)

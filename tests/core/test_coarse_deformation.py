@@ -42,9 +42,9 @@ def caps():
 
 def both(laplacian, handles, anchors, count=COUNT, **settings):
     """The coarse deformer of some handles and anchors, and the one of all points."""
-    coarse = core.coarse_deformer(laplacian, handles, anchors, count=count, **settings)
-    assert isinstance(coarse, core.CoarseDeformer)
-    return coarse, core.Deformer(laplacian, handles, anchors, **settings)
+    coarse = core.deform.coarse_deformer(laplacian, handles, anchors, count=count, **settings)
+    assert isinstance(coarse, core.deform.CoarseDeformer)
+    return coarse, core.deform.Deformer(laplacian, handles, anchors, **settings)
 
 
 def off(result, expected, laplacian):
@@ -100,7 +100,7 @@ def test_weights_carry_linear_functions_along_the_surface():
 @pytest.mark.parametrize("mode", MODES)
 def test_what_is_moved_along_moves_along(mode):
     points, (top, bottom) = sphere().points, caps()
-    deformer = core.CoarseDeformer(sphere(), top | bottom, count=COUNT, **mode)
+    deformer = core.deform.CoarseDeformer(sphere(), top | bottom, count=COUNT, **mode)
     assert np.abs(deformer.solve(points[deformer.handles]) - points).max() < 1e-9
     shift = np.array([10.0, -20.0, 30.0])
     assert np.abs(deformer.solve(points[deformer.handles] + shift) - points - shift).max() < 1e-9
@@ -109,7 +109,7 @@ def test_what_is_moved_along_moves_along(mode):
 @pytest.mark.parametrize("weights", [None, 1.0])
 def test_what_is_turned_turns(weights):
     points, (top, bottom) = sphere().points, caps()
-    deformer = core.CoarseDeformer(sphere(), top | bottom, count=COUNT, weights=weights)
+    deformer = core.deform.CoarseDeformer(sphere(), top | bottom, count=COUNT, weights=weights)
     result = deformer.solve(points[deformer.handles] @ TURN.T + 2.0)
     assert np.abs(result - points @ TURN.T - 2.0).max() < 1e-9
 
@@ -144,7 +144,7 @@ def test_handles_and_anchors_are_where_they_should_be():
     points, (top, bottom) = sphere().points, caps()
     handles = np.flatnonzero(top)[::-1]
     target = points[handles] + np.random.default_rng(0).normal(0.0, 0.1, (len(handles), 3))
-    result = core.CoarseDeformer(sphere(), handles, bottom, count=COUNT).solve(target, steps=1)
+    result = core.deform.CoarseDeformer(sphere(), handles, bottom, count=COUNT).solve(target, steps=1)
     np.testing.assert_array_equal(result[handles], target)
     np.testing.assert_array_equal(result[bottom], points[bottom])
 
@@ -156,7 +156,7 @@ def test_it_does_not_depend_on_the_order_of_the_points():
     for rows in (np.arange(2000), order):
         given = points[rows]
         top = np.flatnonzero(given[:, 2] > 0.8)
-        deformer = core.CoarseDeformer(core.build_laplacian(given), top, given[:, 2] < -0.8, count=800)
+        deformer = core.deform.CoarseDeformer(core.build_laplacian(given), top, given[:, 2] < -0.8, count=800)
         results.append(deformer.solve(given[top] + (0.3, 0.0, 0.3), rtol=1e-9))
     np.testing.assert_allclose(results[1], results[0][order], atol=1e-6)
 
@@ -171,10 +171,10 @@ def test_components_move_by_themselves_and_small_ones_are_not_lost():
     goal[label == 0] = one @ TURN.T
     goal[label == 1] += 1.0
     goal[label == 3] += 5.0
-    deformer = core.CoarseDeformer(laplacian, handles, count=COUNT)
+    deformer = core.deform.CoarseDeformer(laplacian, handles, count=COUNT)
     np.testing.assert_allclose(deformer.solve(goal[handles]), goal, atol=1e-9)
-    assert deformer.notices == core.Deformer(laplacian, handles).notices
-    lone = core.CoarseDeformer(laplacian, [3900], count=COUNT).solve([[1.0, 2.0, 3.0]])
+    assert deformer.notices == core.deform.Deformer(laplacian, handles).notices
+    lone = core.deform.CoarseDeformer(laplacian, [3900], count=COUNT).solve([[1.0, 2.0, 3.0]])
     np.testing.assert_array_equal(lone[:3900], points[:3900])
     np.testing.assert_array_equal(lone[3900], [1.0, 2.0, 3.0])
 
@@ -183,13 +183,13 @@ def test_weights_of_zero_hold_nothing():
     top, bottom = caps()
     weights = np.concatenate([np.full(top.sum(), np.inf), np.zeros(bottom.sum())])
     target = sphere().points[top] + (1.0, 2.0, 3.0)
-    result = core.CoarseDeformer(sphere(), top, bottom, weights=weights, count=COUNT).solve(target)
+    result = core.deform.CoarseDeformer(sphere(), top, bottom, weights=weights, count=COUNT).solve(target)
     np.testing.assert_allclose(result, sphere().points + (1.0, 2.0, 3.0), atol=1e-9)
 
 
 def test_it_goes_on_from_the_last_result():
     top, bottom = caps()
-    deformer = core.CoarseDeformer(sphere(), top, bottom, count=COUNT)
+    deformer = core.deform.CoarseDeformer(sphere(), top, bottom, count=COUNT)
     target = sphere().points[top] + (0.5, 0.0, 0.5)
     settled = deformer.solve(target, rtol=1e-7)
     again, *told = deformer.deform(target, steps=1, start=settled)
@@ -200,29 +200,29 @@ def test_it_goes_on_from_the_last_result():
 def test_few_points_are_all_solved_on():
     laplacian = core.build_laplacian(random_sphere(750))
     z = laplacian.points[:, 2]
-    deformer = core.coarse_deformer(laplacian, z > 0.9, z < -0.9, neighbors=40)
-    assert isinstance(deformer, core.Deformer)
+    deformer = core.deform.coarse_deformer(laplacian, z > 0.9, z < -0.9, neighbors=40)
+    assert isinstance(deformer, core.deform.Deformer)
     target = laplacian.points[deformer.handles] + (0.5, 0.0, 0.5)
-    expected = core.Deformer(laplacian, z > 0.9, z < -0.9, neighbors=40).solve(target)
+    expected = core.deform.Deformer(laplacian, z > 0.9, z < -0.9, neighbors=40).solve(target)
     np.testing.assert_array_equal(deformer.solve(target), expected)
 
 
 def test_bad_input_is_refused_as_by_all_points():
     with pytest.raises(core.PointCloudError, match="no handles"):
-        core.CoarseDeformer(sphere(), [], count=COUNT)
-    deformer = core.CoarseDeformer(sphere(), [0, 1], [2], count=COUNT)
+        core.deform.CoarseDeformer(sphere(), [], count=COUNT)
+    deformer = core.deform.CoarseDeformer(sphere(), [0, 1], [2], count=COUNT)
     with pytest.raises(core.InvalidPointsError, match="Handle positions"):
         deformer.solve(np.zeros((3, 3)))
     with pytest.raises(core.InvalidPointsError, match="[Ss]tarting points"):
         deformer.solve(np.zeros((2, 3)), start=np.zeros((2, 3)))
-    for make in (core.CoarseDeformer, core.coarse_deformer):
+    for make in (core.deform.CoarseDeformer, core.deform.coarse_deformer):
         with pytest.raises(core.PointCloudError, match="points to solve on is 0"):
             make(sphere(), [0], count=0)
 
 
 def test_stages_are_reported():
     seen = []
-    core.CoarseDeformer(sphere(), [0], [1], count=COUNT, progress=lambda *report: seen.append(report))
+    core.deform.CoarseDeformer(sphere(), [0], [1], count=COUNT, progress=lambda *report: seen.append(report))
     assert list(dict.fromkeys(stage for stage, _ in seen)) == ["Points", "Operator", "Equations", "Factors"]
     shares = [share for _, share in seen]
     assert shares == sorted(shares)

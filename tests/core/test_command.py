@@ -42,7 +42,7 @@ class TestAnalyze:
         for name in ("areas", "normals", "trust", "smoothing_lengths", "gaussian_curvature"):
             assert_array_equal(found[name], getattr(laplacian, name))
         assert_array_equal(found["eigenvectors"], spectrum.eigenvectors)
-        assert_array_equal(found["mean_curvature"], core.mean_curvature(laplacian))
+        assert_array_equal(found["mean_curvature"], core.measure.mean_curvature(laplacian))
 
     def test_a_file_of_points_keeps_its_columns_and_its_place(self, run, tmp_path):
         source = write(tmp_path / "a.ply", SPHERE + FAR, heat=SPHERE[:, 0], normal=-SPHERE)
@@ -197,9 +197,9 @@ class TestResults:
     @pytest.mark.parametrize(
         ("verb", "expected"),
         [
-            ("principal-curvatures", core.principal_curvatures),
-            ("surface-variation", core.surface_variation),
-            ("roughness", core.roughness),
+            ("principal-curvatures", core.measure.principal_curvatures),
+            ("surface-variation", core.measure.surface_variation),
+            ("roughness", core.clean.roughness),
         ],
     )
     def test_they_are_what_core_gives_to_the_bit(self, run, tmp_path, verb, expected):
@@ -337,7 +337,7 @@ class TestMesh:
         write_points(tmp_path / "a.ply", PointTable(SPHERE, colors=given))
         code, _ = run("mesh", tmp_path / "a.ply", "--out", tmp_path / "b.ply")
         mesh = read_points(tmp_path / "b.ply")
-        carrying = core.values_on_mesh(core.build_laplacian(SPHERE), mesh.points)
+        carrying = core.surface.values_on_mesh(core.build_laplacian(SPHERE), mesh.points)
         exact = np.clip(carrying.interpolate(given.astype(float))[-len(mesh.points) :], 0.0, 1.0)
         assert code == 0
         assert ((exact > 0.3) & (exact < 0.7)).any()
@@ -386,7 +386,7 @@ class TestFiles:
 
     def test_splats_stay_splats(self, run, tmp_path):
         count = len(SPHERE)
-        splats = core.Splats(
+        splats = core.splats.Splats(
             positions=SPHERE,
             scales=np.full((count, 3), 0.05),
             rotations=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
@@ -394,16 +394,16 @@ class TestFiles:
             colors=np.zeros((count, 3)),
             harmonics=np.zeros((count, 0, 3)),
         )
-        core.write_splats(tmp_path / "a.ply", splats)
+        core.splats.write_splats(tmp_path / "a.ply", splats)
         code, [line] = run("analyze", tmp_path / "a.ply", "--out", tmp_path / "b.ply")
         assert (code, line["left_out_count"]) == (0, 5)
         assert any("Floaters left out" in notice for notice in line["notices"])
-        found = core.read_splats(tmp_path / "b.ply")
+        found = core.splats.read_splats(tmp_path / "b.ply")
         assert found.file.columns["lb_area"].sum() == pytest.approx(4.0 * np.pi, rel=0.01)
         code, [line] = run(
             "thin-out", tmp_path / "b.ply", "--by", "number", "--count", 200, "--out", tmp_path / "c.ply"
         )
-        assert (code, len(core.read_splats(tmp_path / "c.ply"))) == (0, line["points"])
+        assert (code, len(core.splats.read_splats(tmp_path / "c.ply"))) == (0, line["points"])
         assert "positions only" in run("convert", tmp_path / "a.ply", "--out", tmp_path / "a.npz")[1][0]["notices"][-1]
         code, [line] = run("analyze", tmp_path / "a.ply", "--out", tmp_path / "c.csv")
         assert (code, "Splats cannot be written" in line["error"]) == (1, True)

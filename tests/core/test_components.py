@@ -105,12 +105,12 @@ class TestIslands:
     @pytest.mark.parametrize(
         ("use", "elsewhere"),
         [
-            (lambda on: core.geodesic_distance(on, [0]), np.inf),
-            (lambda on: core.signed_distance(on, [0, 1]), np.inf),
-            (lambda on: core.nearest_source(on, [0]), -1),
-            (lambda on: core.grow(on, [0], np.inf), False),
-            (lambda on: np.linalg.norm(core.transport(on, [0], [0.3, 0.5, 0.9]), axis=1), 0.0),
-            (lambda on: core.logarithmic_map(on, 0)[:, 1], np.nan),
+            (lambda on: core.distance.geodesic_distance(on, [0]), np.inf),
+            (lambda on: core.distance.signed_distance(on, [0, 1]), np.inf),
+            (lambda on: core.distance.nearest_source(on, [0]), -1),
+            (lambda on: core.distance.grow(on, [0], np.inf), False),
+            (lambda on: np.linalg.norm(core.distance.transport(on, [0], [0.3, 0.5, 0.9]), axis=1), 0.0),
+            (lambda on: core.distance.logarithmic_map(on, 0)[:, 1], np.nan),
         ],
         ids=["distance", "signed distance", "nearest source", "grown", "transport", "map"],
     )
@@ -215,7 +215,7 @@ class TestLonePoints:
         assert np.all(spectrum.eigenvectors[OUT] == 0.0)
         assert np.all(parts.apply(parts.points)[OUT] == 0.0)
         assert np.all(parts.apply(parts.points, raw=True)[OUT] == 0.0)
-        assert np.all(core.mean_curvature(parts)[OUT] == 0.0)
+        assert np.all(core.measure.mean_curvature(parts)[OUT] == 0.0)
         assert parts.stiffness[OUT].count_nonzero() == 0
 
     def test_the_rest_is_what_it_is_without_them(self, parts):
@@ -243,7 +243,7 @@ class TestLonePoints:
         assert laplacian.areas.sum() == pytest.approx(4.0 * np.pi, rel=3e-3)
 
     def test_stability_passes_them_by(self, parts):
-        stability = core.check_stability(parts)
+        stability = core.paper.check_stability(parts)
         assert stability.components == 2
         assert stability.area_ratio < 1e4
         assert stability.fill_distance < 0.5

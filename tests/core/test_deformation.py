@@ -108,7 +108,7 @@ def test_faint_pairs_stay_where_they_alone_hold_parts_together():
 def test_nothing_moves_where_nothing_is_moved(mode):
     points, _, laplacian = small_bar()
     first, last = ends()
-    deformer = core.Deformer(laplacian, last, first, **mode)
+    deformer = core.deform.Deformer(laplacian, last, first, **mode)
     found = deformer.deform(points[last])
     assert np.abs(found.points - points).max() < 1e-8 * LENGTH
     assert found.converged
@@ -118,7 +118,7 @@ def test_nothing_moves_where_nothing_is_moved(mode):
 @pytest.mark.parametrize("mode", MODES)
 def test_all_moves_along_with_the_constrained_points(mode):
     points, _, laplacian = small_bar()
-    deformer = core.Deformer(laplacian, np.concatenate(ends()), **mode)
+    deformer = core.deform.Deformer(laplacian, np.concatenate(ends()), **mode)
     result = deformer.solve(points[deformer.handles] + (10.0, -20.0, 30.0))
     assert np.abs(result - points - (10.0, -20.0, 30.0)).max() < 1e-6 * LENGTH
 
@@ -126,7 +126,7 @@ def test_all_moves_along_with_the_constrained_points(mode):
 @pytest.mark.parametrize("weights", [None, 1.0])
 def test_all_turns_with_the_constrained_points(weights):
     points, _, laplacian = small_bar()
-    deformer = core.Deformer(laplacian, np.concatenate(ends()), weights=weights)
+    deformer = core.deform.Deformer(laplacian, np.concatenate(ends()), weights=weights)
     found = deformer.deform(points[deformer.handles] @ QUARTER.T + 2.0)
     assert np.abs(found.points - points @ QUARTER.T - 2.0).max() < 1e-3 * LENGTH
     assert found.converged
@@ -135,9 +135,9 @@ def test_all_turns_with_the_constrained_points(weights):
 def test_turning_is_found_from_the_surface_too():
     # The first guess from the constrained points is no help where the start names another one.
     points, _, laplacian = small_bar()
-    deformer = core.Deformer(laplacian, np.concatenate(ends()))
+    deformer = core.deform.Deformer(laplacian, np.concatenate(ends()))
     target = points[deformer.handles] @ QUARTER.T
-    linear = core.Deformer(laplacian, deformer.handles, rotation_aware=False).solve(target)
+    linear = core.deform.Deformer(laplacian, deformer.handles, rotation_aware=False).solve(target)
     assert np.abs(linear - points @ QUARTER.T).max() > 0.02 * LENGTH
     result, steps, _ = deformer.deform(target, start=linear)
     assert steps > 2
@@ -149,7 +149,7 @@ def test_linear_mode_bends_a_sheet_to_the_cubic_of_a_clamped_beam():
     x = points[:, 0]
     low, high = x < 0.2, x > 0.8
     laplacian = core.build_laplacian(points)
-    deformer = core.Deformer(laplacian, high, low, rotation_aware=False)
+    deformer = core.deform.Deformer(laplacian, high, low, rotation_aware=False)
     result = deformer.solve(points[high] + (0.0, 0.0, 1.0))
     t = np.clip((x - x[low].max()) / (x[high].min() - x[low].max()), 0.0, 1.0)
     assert np.abs(result[:, 2] - (3.0 * t**2 - 2.0 * t**3)).max() < 0.03
@@ -159,7 +159,7 @@ def test_linear_mode_bends_a_sheet_to_the_cubic_of_a_clamped_beam():
 def test_linear_mode_is_linear():
     laplacian = small_sphere()
     points, (top, bottom) = laplacian.points, caps()
-    deformer = core.Deformer(laplacian, top, bottom, rotation_aware=False)
+    deformer = core.deform.Deformer(laplacian, top, bottom, rotation_aware=False)
     one, other = np.random.default_rng(0).standard_normal((2, len(top), 3))
     moved = [deformer.solve(points[top] + move) - points for move in (one, other, 2.0 * one - other)]
     np.testing.assert_allclose(moved[2], 2.0 * moved[0] - moved[1], atol=1e-9)
@@ -170,7 +170,7 @@ def test_bar_bends_smoothly_and_keeps_its_section():
     points, section, laplacian = small_bar()
     first, last = ends()
     target = bent_end(points[last], 0.5 * np.pi)
-    deformer = core.Deformer(laplacian, last, first)
+    deformer = core.deform.Deformer(laplacian, last, first)
     result, steps, converged = deformer.deform(target)
     assert converged
     assert steps < 15
@@ -178,7 +178,7 @@ def test_bar_bends_smoothly_and_keeps_its_section():
     angles = turns(result, section)
     assert angles.max() < 1.4 * angles.mean()
     assert abs(angles.mean() - 0.5 * np.pi / 36) < 0.05 * angles.mean()
-    linear = core.Deformer(laplacian, last, first, rotation_aware=False).solve(target)
+    linear = core.deform.Deformer(laplacian, last, first, rotation_aware=False).solve(target)
     assert np.abs(section_areas(linear, section) - 1.0).max() > 0.25
 
 
@@ -189,7 +189,7 @@ def test_bend_does_not_depend_on_the_sampling():
     inside = np.setdiff1d(section.ravel(), np.concatenate([first, last]))
     shifted[inside, 0] += np.random.default_rng(0).uniform(-0.3, 0.3, len(inside)) * LENGTH / 36
     one, other = (
-        core.Deformer(operator, last, first).solve(bent_end(regular[last], 1.0))[section].mean(axis=1)
+        core.deform.Deformer(operator, last, first).solve(bent_end(regular[last], 1.0))[section].mean(axis=1)
         for operator in (laplacian, core.build_laplacian(shifted))
     )
     assert np.abs(one - other).max() < 0.01 * LENGTH
@@ -199,23 +199,23 @@ def test_constrained_points_are_where_they_should_be():
     laplacian, (top, bottom) = small_sphere(), caps()
     top = top[::-1]
     target = laplacian.points[top] + np.random.default_rng(0).normal(0.0, 0.2, (len(top), 3))
-    deformer = core.Deformer(laplacian, top, bottom)
+    deformer = core.deform.Deformer(laplacian, top, bottom)
     result = deformer.solve(target, steps=3)
     np.testing.assert_allclose(result[top], target, atol=1e-13)
     np.testing.assert_allclose(result[bottom], laplacian.points[bottom], atol=1e-13)
     by_mask = np.zeros(len(result), dtype=bool)
     by_mask[top] = True
-    again = core.Deformer(laplacian, by_mask, bottom).solve(target[np.argsort(top)], steps=3)
+    again = core.deform.Deformer(laplacian, by_mask, bottom).solve(target[np.argsort(top)], steps=3)
     np.testing.assert_allclose(again, result, atol=1e-11)
 
 
 def test_soft_constraints_give_way_as_their_weights_fall():
     laplacian, (top, bottom) = small_sphere(), caps()
     target = laplacian.points[top] + (0.0, 0.0, 1.0)
-    hard = core.Deformer(laplacian, top, bottom, rotation_aware=False).solve(target)
+    hard = core.deform.Deformer(laplacian, top, bottom, rotation_aware=False).solve(target)
     away = []
     for weight in (1e-3, 1.0, 1e6):
-        result = core.Deformer(laplacian, top, bottom, rotation_aware=False, weights=weight).solve(target)
+        result = core.deform.Deformer(laplacian, top, bottom, rotation_aware=False, weights=weight).solve(target)
         away.append(np.abs(result - hard).max())
     assert away[0] > 1e-2
     assert 10.0 * away[1] < away[0]
@@ -227,9 +227,9 @@ def test_weights_are_those_of_handles_then_of_anchors():
     target = laplacian.points[top] + (0.5, 0.0, 1.0)
     weights = np.concatenate([np.full(len(top), np.inf), np.zeros(len(bottom))])
     weights[-10:] = np.inf
-    result = core.Deformer(laplacian, top, bottom, weights=weights).solve(target)
+    result = core.deform.Deformer(laplacian, top, bottom, weights=weights).solve(target)
     np.testing.assert_allclose(result[top], target, atol=1e-12)
-    np.testing.assert_allclose(result, core.Deformer(laplacian, top, bottom[-10:]).solve(target), atol=1e-10)
+    np.testing.assert_allclose(result, core.deform.Deformer(laplacian, top, bottom[-10:]).solve(target), atol=1e-10)
     assert np.abs(result[bottom[:-10]] - laplacian.points[bottom[:-10]]).max() > 1e-3
 
 
@@ -240,7 +240,7 @@ def test_parts_that_nothing_holds_stay():
     laplacian = core.build_laplacian(points, options=core.LaplacianOptions(neighbors=40))
     assert list(laplacian.component[-2:]) == [-1, -1]
     handles = np.array([0, len(points) - 1])
-    deformer = core.Deformer(laplacian, handles, [400])
+    deformer = core.deform.Deformer(laplacian, handles, [400])
     result = deformer.solve(points[handles] + (0.0, 0.0, 0.5))
     np.testing.assert_array_equal(result[500:1101], points[500:1101])
     np.testing.assert_array_equal(result[handles[1]], points[handles[1]] + (0.0, 0.0, 0.5))
@@ -249,7 +249,7 @@ def test_parts_that_nothing_holds_stay():
     assert len(deformer.notices) == 2
     assert deformer.notices[0].startswith("2 points are on no surface")
     assert deformer.notices[1].startswith("1 components with 600 points")
-    lone = core.Deformer(laplacian, [1101]).solve([[9.0, 9.0, 9.0]])
+    lone = core.deform.Deformer(laplacian, [1101]).solve([[9.0, 9.0, 9.0]])
     np.testing.assert_array_equal(lone[:1101], points[:1101])
     np.testing.assert_array_equal(lone[1101], [9.0, 9.0, 9.0])
 
@@ -260,27 +260,27 @@ def test_every_part_turns_by_itself():
     laplacian = core.build_laplacian(points, options=core.LaplacianOptions(neighbors=40))
     handles = np.concatenate([np.arange(0, 500, 50), np.arange(500, 1100, 50)])
     goal = np.concatenate([one @ QUARTER.T, other + 1.0])
-    result = core.Deformer(laplacian, handles).solve(goal[handles])
+    result = core.deform.Deformer(laplacian, handles).solve(goal[handles])
     np.testing.assert_allclose(result, goal, atol=1e-8)
 
 
 def test_one_handle_alone_carries_the_surface_along():
     laplacian = small_sphere()
-    result = core.Deformer(laplacian, [7]).solve(laplacian.points[[7]] + (1.0, 2.0, 3.0))
+    result = core.deform.Deformer(laplacian, [7]).solve(laplacian.points[[7]] + (1.0, 2.0, 3.0))
     np.testing.assert_allclose(result, laplacian.points + (1.0, 2.0, 3.0), atol=1e-8)
 
 
 def test_all_points_may_be_constrained():
     laplacian = small_sphere()
     target = 2.0 * laplacian.points
-    result = core.Deformer(laplacian, np.arange(len(target))).solve(target)
+    result = core.deform.Deformer(laplacian, np.arange(len(target))).solve(target)
     np.testing.assert_allclose(result, target, atol=1e-12)
 
 
 def test_solves_do_not_depend_on_those_before_unless_told_so():
     points, _, laplacian = small_bar()
     first, last = ends()
-    deformer = core.Deformer(laplacian, last, first)
+    deformer = core.deform.Deformer(laplacian, last, first)
     target = bent_end(points[last], 1.2)
     result = deformer.solve(target)
     deformer.solve(points[last])
@@ -307,7 +307,7 @@ def test_solves_do_not_depend_on_those_before_unless_told_so():
 )
 def test_bad_sets_and_weights_are_refused(arguments, text):
     with pytest.raises(core.PointCloudError, match=text):
-        core.Deformer(small_sphere(), **arguments)
+        core.deform.Deformer(small_sphere(), **arguments)
 
 
 @pytest.mark.parametrize(
@@ -331,12 +331,12 @@ def test_bad_positions_are_refused(positions, text):
 
 @functools.cache
 def bound_to_two():
-    return core.Deformer(small_sphere(), [0, 1], [2])
+    return core.deform.Deformer(small_sphere(), [0, 1], [2])
 
 
 def test_stages_and_steps_are_reported():
     seen = []
-    core.Deformer(small_sphere(), [0], [1], progress=lambda *report: seen.append(report))
+    core.deform.Deformer(small_sphere(), [0], [1], progress=lambda *report: seen.append(report))
     assert list(dict.fromkeys(stage for stage, _ in seen)) == ["Operator", "Equations", "Factors"]
     seen.clear()
     target = small_sphere().points[:2] + 0.1

@@ -24,15 +24,15 @@ def everything(points):
         "normals": laplacian.normals,
         "stiffness": laplacian.stiffness.data,
         "boundary": laplacian.boundary,
-        "curvature": core.mean_curvature(laplacian),
+        "curvature": core.measure.mean_curvature(laplacian),
         "eigenvalues": spectrum.eigenvalues,
         "modes": spectrum.eigenvectors,
-        "smooth": core.smooth_points(laplacian, core.exponential(0.01)),
-        "segments": core.segment(laplacian, 4, spectrum=spectrum),
-        "harmonic": core.harmonic_field(laplacian, [0, 1], [0.0, 1.0]),
-        "distance": core.geodesic_distance(laplacian, [0]),
-        "deformed": core.Deformer(laplacian, top, bottom).solve(moved),
-        "coarse": core.coarse_deformer(laplacian, top, bottom).solve(moved),
+        "smooth": core.clean.smooth_points(laplacian, core.clean.exponential(0.01)),
+        "segments": core.spectral.segment(laplacian, 4, spectrum=spectrum),
+        "harmonic": core.distance.harmonic_field(laplacian, [0, 1], [0.0, 1.0]),
+        "distance": core.distance.geodesic_distance(laplacian, [0]),
+        "deformed": core.deform.Deformer(laplacian, top, bottom).solve(moved),
+        "coarse": core.deform.coarse_deformer(laplacian, top, bottom).solve(moved),
     }
 
 

@@ -7,27 +7,27 @@ import re
 import pytest
 
 import core
+from tests.public import PUBLIC, SPACES
 
 WITHOUT = {  # functions whose examples are those of what they go with, or which need a file
-    *("band", "boost", "exponential", "fairing", "chebyshev_filter", "check_points", "coarse_deformer", "floaters"),
-    *("modes_needed", "points_that_fit", "signature_energies", "signature_times", "smoothing_base", "values_on_mesh"),
-    *("load", "read_splats", "write_splats"),
+    *("check_points", "clean.band", "clean.boost", "clean.chebyshev_filter", "clean.exponential", "clean.fairing"),
+    *("clean.smoothing_base", "deform.coarse_deformer", "load", "points_that_fit", "spectral.modes_needed"),
+    *("spectral.signature_energies", "spectral.signature_times", "splats.floaters", "splats.read_splats"),
+    *("splats.write_splats", "surface.values_on_mesh"),
 }
-CLASSES = {"Agreed", "CoarseDeformer", "Deformer", "Doubt", "Geodesics", "LaplacianOptions", "Prolongation", "Slopes"}
-CLASSES |= {"Heat", "ReactionDiffusion", "Skinner", "Strays", "SurfaceMeasures", "Transport", "Wave"}
-METHODS = {"LaplaceBeltrami.apply", "LaplaceBeltrami.eigenpairs", "LaplaceBeltrami.toward", "paper.build_laplacian"}
-FUNCTIONS = {name for name in core.__all__ if inspect.isfunction(getattr(core, name))}
+CLASSES = {
+    *("Agreed", "Doubt", "LaplacianOptions", "clean.Prolongation", "clean.Strays", "deform.CoarseDeformer"),
+    *("deform.Deformer", "distance.Geodesics", "distance.Transport", "measure.Slopes", "measure.SurfaceMeasures"),
+    *("motion.Heat", "motion.ReactionDiffusion", "motion.Wave", "rig.Skinner"),
+}
+METHODS = {"LaplaceBeltrami.apply", "LaplaceBeltrami.eigenpairs", "LaplaceBeltrami.toward"}
+FUNCTIONS = {name for name, one in PUBLIC.items() if inspect.isfunction(one)}
 SHOWN = sorted(CLASSES | METHODS | FUNCTIONS - WITHOUT)
 SECTIONS = ["Parameters", "Attributes", "Returns", "Raises", "See Also", "Notes", "References", "Examples"]
 FOUND = {
     test.name: test
-    for name in core.__all__
-    for test in doctest.DocTestFinder(exclude_empty=False).find(getattr(core, name), name, globs={})
-} | {
-    test.name: test
-    for test in doctest.DocTestFinder(exclude_empty=False).find(
-        core.paper.build_laplacian, "paper.build_laplacian", globs={}
-    )
+    for name, one in PUBLIC.items()
+    for test in doctest.DocTestFinder(exclude_empty=False).find(one, name, globs={})
 }
 RUNNABLE = [name for name, test in FOUND.items() if test.examples]
 
@@ -49,12 +49,12 @@ def test_calls_that_users_start_from_have_examples():
     assert set(RUNNABLE) == set(SHOWN)
 
 
-OTHERS = {  # of the public packages that are not listed in core itself
+OTHERS = {  # of the namespaces that give more
     test.name: test
-    for package in (core.files, core.paper, core.splats, core.tiles)
-    for name in dir(package)
-    if inspect.isfunction(getattr(package, name)) and not hasattr(core, name)
-    for test in doctest.DocTestFinder().find(getattr(package, name), f"{package.__name__}.{name}", globs={})
+    for space in ("files", "paper", "splats", "tiles")
+    for name in SPACES[space]
+    if inspect.isfunction(one := getattr(getattr(core, space), name)) and f"{space}.{name}" not in PUBLIC
+    for test in doctest.DocTestFinder().find(one, f"{space}.{name}", globs={})
     if test.examples
 }
 
@@ -77,7 +77,7 @@ def test_examples_call_core_by_the_name_that_it_has_in_the_wheel():
 def test_examples_begin_with_the_sphere_of_the_package():
     sphere = [example.source for example in doctest.DocTestParser().get_examples(core.__doc__)]
     begins = {name: [example.source for example in FOUND[name].examples[: len(sphere)]] for name in RUNNABLE}
-    assert [name for name in RUNNABLE if begins[name] != sphere] == ["minimal_surface"]
+    assert [name for name in RUNNABLE if begins[name] != sphere] == ["deform.minimal_surface"]
 
 
 @pytest.mark.parametrize("name", SHOWN)
@@ -85,7 +85,9 @@ def test_see_also_names_what_there_is(name):
     lines = sections(name)["See Also"].strip().splitlines()
     named = [other.strip() for line in lines for other in line.split(" : ")[0].split(",")]
     assert named
-    assert set(named) <= set(FOUND)
+    space = name.partition(".")[0]
+    named = {other if other in FOUND or space not in SPACES else f"{space}.{other}" for other in named}
+    assert named <= FOUND.keys()
     assert name not in named
 
 

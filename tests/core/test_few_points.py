@@ -30,13 +30,17 @@ def _shape(name, count):
 
 def _uses(laplacian):
     yield from (laplacian.areas, laplacian.stiffness.data, laplacian.normals, laplacian.eigenpairs(1).eigenvalues)
-    yield from (core.mean_curvature(laplacian), core.roughness(laplacian), core.clean_points(laplacian))
-    yield core.principal_curvatures(laplacian).first
-    yield core.geodesic_distance(laplacian, [0])
-    yield core.logarithmic_map(laplacian, 0)
-    parts = core.measure_parts(laplacian)
+    yield from (
+        core.measure.mean_curvature(laplacian),
+        core.clean.roughness(laplacian),
+        core.clean.clean_points(laplacian),
+    )
+    yield core.measure.principal_curvatures(laplacian).first
+    yield core.distance.geodesic_distance(laplacian, [0])
+    yield core.distance.logarithmic_map(laplacian, 0)
+    parts = core.measure.measure_parts(laplacian)
     yield from (parts.areas, parts.area_uncertainties)
-    yield core.harmonic_field(laplacian, [0, 1], [0.0, 1.0])
+    yield core.distance.harmonic_field(laplacian, [0, 1], [0.0, 1.0])
 
 
 @pytest.mark.parametrize("count", SIZES)
@@ -51,18 +55,21 @@ def test_all_runs_on_what_neighbors_there_are(name, count):
         values = values[known] if len(values) == len(points) else values
         assert np.isfinite(values).all()
     assert np.linalg.eigvalsh(laplacian.stiffness.toarray()).min() > -1e-9
-    assert core.stray_points(points).mean() < 0.3
+    assert core.clean.stray_points(points).mean() < 0.3
 
 
 def test_corners_of_a_cube_run():
     laplacian = core.build_laplacian(_cube())
     np.testing.assert_allclose(laplacian.areas, laplacian.areas.mean())
-    assert abs(core.measure_parts(laplacian).areas[0] - 6.0) <= core.measure_parts(laplacian).area_uncertainties[0]
+    assert (
+        abs(core.measure.measure_parts(laplacian).areas[0] - 6.0)
+        <= core.measure.measure_parts(laplacian).area_uncertainties[0]
+    )
 
 
 @pytest.mark.parametrize("count", SIZES)
 def test_areas_of_spheres_are_within_their_uncertainty(count):
-    found = core.measure_parts(core.build_laplacian(random_sphere(count)))
+    found = core.measure.measure_parts(core.build_laplacian(random_sphere(count)))
     assert abs(found.areas[0] - 4.0 * np.pi) <= found.area_uncertainties[0]
 
 
@@ -81,7 +88,9 @@ def test_the_paper_runs_on_fewer_points_than_its_neighbors():
 
 
 @pytest.mark.parametrize("count", [1, 2, 5, 6])
-@pytest.mark.parametrize("call", [core.build_laplacian, core.stray_points, core.estimate_normals, core.estimate_areas])
+@pytest.mark.parametrize(
+    "call", [core.build_laplacian, core.clean.stray_points, core.estimate_normals, core.estimate_areas]
+)
 def test_as_many_points_as_the_error_asks_for_are_enough(call, count):
     points = random_sphere(7)
     with pytest.raises(core.TooFewPointsError, match=f"at least 7 different points, and there are {count}"):
@@ -99,10 +108,10 @@ def test_points_around_lone_ones_help():
 def test_as_many_parts_as_the_error_offers_are_found():
     laplacian = core.build_laplacian(random_sphere(20))
     with pytest.raises(core.TooFewPointsError, match="Ask for at most 4, or add points"):
-        core.segment(laplacian, 6)
-    assert len(np.unique(core.segment(laplacian, 4))) == 4
+        core.spectral.segment(laplacian, 6)
+    assert len(np.unique(core.spectral.segment(laplacian, 4))) == 4
     with pytest.raises(core.TooFewPointsError, match=r"2\. Add points\."):
-        core.segment(core.build_laplacian(random_sphere(8)), 2)
+        core.spectral.segment(core.build_laplacian(random_sphere(8)), 2)
 
 
 @pytest.mark.parametrize("name", ["sphere", "torus"])
@@ -111,21 +120,23 @@ def test_as_many_parts_as_the_error_offers_are_found():
 def test_a_mesh_is_made_or_too_few_points_are_told(name, count, detail):
     laplacian = core.build_laplacian(_shape(name, count))
     try:
-        vertices = core.mesh_surface(laplacian, detail=detail).vertices
+        vertices = core.surface.mesh_surface(laplacian, detail=detail).vertices
     except core.TooFewPointsError:
         return
     assert np.isfinite(vertices).all()
 
 
 def test_a_sphere_of_thirty_points_has_a_closed_mesh():
-    found = core.enclosed_volume(core.build_laplacian(random_sphere(30)))
+    found = core.measure.enclosed_volume(core.build_laplacian(random_sphere(30)))
     assert list(found.openings) == [0]
     assert abs(found.volume / (4.0 / 3.0 * np.pi) - 1.0) < 0.3
 
 
 def test_parts_are_measured_where_there_are_too_few_points_for_a_volume():
     laplacian = core.build_laplacian(_shape("sphere", 8))
-    rows, notices = part_table(laplacian, None, None, lambda operator, report: core.enclosed_volume(operator), None)
+    rows, notices = part_table(
+        laplacian, None, None, lambda operator, report: core.measure.enclosed_volume(operator), None
+    )
     assert rows[0].points == 8
     assert np.isnan(rows[0].volume)
     assert any("There is no volume: The 8 points give no mesh" in text for text in notices)

@@ -12,9 +12,10 @@ import core
 from benchmarks.samplings import fibonacci_sphere
 from core.frozen import Frozen
 from core.options import LaplacianOptions, PaperOptions
+from tests.public import PUBLIC
 
 RESULTS = sorted(
-    (one for name in core.__all__ if inspect.isclass(one := getattr(core, name)) and dataclasses.is_dataclass(one)),
+    (one for one in PUBLIC.values() if inspect.isclass(one) and dataclasses.is_dataclass(one)),
     key=lambda one: one.__name__,
 )
 
@@ -36,7 +37,7 @@ class Sample(Frozen):
 
 @pytest.fixture
 def given():
-    return Sample(np.arange(3.0), sparse.csr_array(np.eye(3)), [core.WaveState(np.ones(2), np.zeros(2))], ["a"])
+    return Sample(np.arange(3.0), sparse.csr_array(np.eye(3)), [core.motion.WaveState(np.ones(2), np.zeros(2))], ["a"])
 
 
 def test_arrays_of_a_result_are_read_only(given):

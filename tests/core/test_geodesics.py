@@ -18,7 +18,7 @@ def mean_error(found, exact):
 def test_great_circles(operators, name, sources):
     laplacian = operators(name)
     exact = on_sphere(laplacian.points, sources)
-    found = core.geodesic_distance(laplacian, sources)
+    found = core.distance.geodesic_distance(laplacian, sources)
     assert mean_error(found, exact) < 2e-3
     assert np.abs(found - exact).max() < 2.5e-2  # next to single points where they are few
     np.testing.assert_array_equal(found[sources], 0.0)
@@ -35,14 +35,16 @@ def test_meridians_of_the_torus(operators):
     meridian = (apart < 0.02) & (np.abs(theta) > 0.5)
     assert np.count_nonzero(meridian) > 20
     exact = 0.4 * np.abs(theta - theta[source])
-    np.testing.assert_allclose(core.geodesic_distance(laplacian, [source])[meridian], exact[meridian], rtol=1e-2)
+    np.testing.assert_allclose(
+        core.distance.geodesic_distance(laplacian, [source])[meridian], exact[meridian], rtol=1e-2
+    )
 
 
 @pytest.mark.parametrize("sources", [[0], [1770], [0, 59, 1770]], ids=["corner", "middle", "several"])
 def test_flat_square_with_its_boundary(operators, sources):
     laplacian = operators("square grid")
     points = laplacian.points
-    found = core.geodesic_distance(laplacian, sources)
+    found = core.distance.geodesic_distance(laplacian, sources)
     exact = np.linalg.norm(points[:, None] - points[None, sources], axis=2).min(axis=1)
     assert mean_error(found, exact) < 1e-3
     assert np.all(found >= exact - 0.5 / 59)  # half a spacing, where the fronts of several sources meet
@@ -64,7 +66,7 @@ def test_scan_lines(across, jitter, noise):
     points[:, 2] = noise * np.random.default_rng(2).normal(size=len(points))
     points = points @ np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0] + [3e5, 5e6, 200.0]
     laplacian = core.build_laplacian(points)
-    geodesics, carried = core.Geodesics(laplacian), core.Transport(laplacian)
+    geodesics, carried = core.distance.Geodesics(laplacian), core.distance.Transport(laplacian)
     for source in sources.values():
         exact = np.linalg.norm(points - points[source], axis=1)
         far = exact > 0.999 * across
@@ -82,7 +84,7 @@ def test_scan_lines(across, jitter, noise):
 def test_cells_and_sides_on_scan_lines(across):
     points, sources = scan_lines(across, 0.1)
     laplacian = core.build_laplacian(points)
-    geodesics = core.Geodesics(laplacian)
+    geodesics = core.distance.Geodesics(laplacian)
     index = list(sources.values())
     apart = np.linalg.norm(points[:, None] - points[None, index], axis=2)
     label = geodesics.nearest_source(index)
@@ -103,7 +105,7 @@ def test_circles_of_latitude(lines):
     points = np.stack([np.sin(rise) * np.cos(turn), np.sin(rise) * np.sin(turn), np.cos(rise)], axis=2).reshape(-1, 3)
     source = len(points) // 2 + 17
     exact = on_sphere(points, [source])
-    found = core.geodesic_distance(core.build_laplacian(points), [source])
+    found = core.distance.geodesic_distance(core.build_laplacian(points), [source])
     assert mean_error(found, exact) < 8e-3
 
 
@@ -113,7 +115,7 @@ def test_rings_whose_gaps_grow_with_the_range():
     source = 160 * 7
     exact = np.linalg.norm(points - points[source], axis=1)
     seen = (points @ points[source] > 0.0) & (exact > 0.8)  # the way to others leads around the scanner
-    found = core.geodesic_distance(core.build_laplacian(points), [source])
+    found = core.distance.geodesic_distance(core.build_laplacian(points), [source])
     np.testing.assert_allclose(found[seen], exact[seen], rtol=0.15)
     assert mean_error(found[seen], exact[seen]) < 1e-2
 
@@ -129,7 +131,7 @@ def test_the_way_leads_around_a_hole():
     hidden = turn > own + other
     tangents = np.sqrt(radius[source] ** 2 - 0.09) + np.sqrt(radius**2 - 0.09)
     exact = np.where(hidden, tangents + 0.3 * (turn - own - other), np.linalg.norm(points - points[source], axis=1))
-    found = core.geodesic_distance(core.build_laplacian(points), [source])
+    found = core.distance.geodesic_distance(core.build_laplacian(points), [source])
     assert np.count_nonzero(hidden) > 150
     assert mean_error(found[hidden], exact[hidden]) < 1.2e-2
     assert mean_error(found, exact) < 6e-3
@@ -140,7 +142,7 @@ def test_around_the_edges_of_a_cube():
     points = grid_points(side, side, side)
     points = points[np.abs(points).max(axis=1) == 1.0]
     top = int(np.argmin(np.linalg.norm(points - [0.0, 0.0, 1.0], axis=1)))
-    found = core.geodesic_distance(core.build_laplacian(points), [top])
+    found = core.distance.geodesic_distance(core.build_laplacian(points), [top])
     middle = np.abs(points[:, 0]) < 1e-9
     side = middle & (points[:, 1] == 1.0) & (np.abs(points[:, 2]) < 0.9)
     np.testing.assert_allclose(found[side], 2.0 - points[side, 2], rtol=0.05)
@@ -152,7 +154,7 @@ def test_the_poles_of_few_points_are_reached():
     laplacian = core.build_laplacian(
         points, options=core.LaplacianOptions(bandwidth="local", neighbors=20, bandwidth_factor=1.0 / 3.0)
     )
-    distance = core.geodesic_distance(laplacian, [0])
+    distance = core.distance.geodesic_distance(laplacian, [0])
     assert np.abs(distance[:10]).max() < 1e-9
     assert np.abs(distance[40:] - np.pi).max() < 0.1 * np.pi
 
@@ -160,25 +162,25 @@ def test_the_poles_of_few_points_are_reached():
 def test_points_left_out():
     points = np.concatenate([fibonacci_sphere(900), [[20.0, 0.0, 0.0]]])
     laplacian = core.build_laplacian(points)
-    assert np.isinf(core.geodesic_distance(laplacian, [0])[900])
-    np.testing.assert_array_equal(core.geodesic_distance(laplacian, [0, 900])[[0, 900]], 0.0)
+    assert np.isinf(core.distance.geodesic_distance(laplacian, [0])[900])
+    np.testing.assert_array_equal(core.distance.geodesic_distance(laplacian, [0, 900])[[0, 900]], 0.0)
     with pytest.raises(core.InvalidPointsError, match="All 1 sources are points that the operator left out"):
-        core.geodesic_distance(laplacian, [900])
+        core.distance.geodesic_distance(laplacian, [900])
 
 
 def test_masks_are_sets_too(operators):
     laplacian = operators("even sphere")
     mask = laplacian.points[:, 2] > 0.9
-    found = core.geodesic_distance(laplacian, mask)
-    np.testing.assert_array_equal(found, core.geodesic_distance(laplacian, np.flatnonzero(mask)[::-1]))
+    found = core.distance.geodesic_distance(laplacian, mask)
+    np.testing.assert_array_equal(found, core.distance.geodesic_distance(laplacian, np.flatnonzero(mask)[::-1]))
     assert np.all(found[~mask] > 0.0)
 
 
 def test_lengths_serve_many_sources(operators):
     laplacian = operators("even sphere")
-    geodesics = core.Geodesics(laplacian)
+    geodesics = core.distance.Geodesics(laplacian)
     for sources in ([0], [3, 1500], laplacian.points[:, 2] > 0.9):
-        np.testing.assert_array_equal(geodesics.distance(sources), core.geodesic_distance(laplacian, sources))
+        np.testing.assert_array_equal(geodesics.distance(sources), core.distance.geodesic_distance(laplacian, sources))
     with pytest.raises(core.InvalidPointsError, match="no sources"):
         geodesics.distance([])
 
@@ -186,4 +188,4 @@ def test_lengths_serve_many_sources(operators):
 @pytest.mark.parametrize(("sources", "text"), [([], "no sources"), ([2500], "below 2500"), ([0.5], "whole numbers")])
 def test_bad_sources(operators, sources, text):
     with pytest.raises(core.InvalidPointsError, match=text):
-        core.geodesic_distance(operators("even sphere"), sources)
+        core.distance.geodesic_distance(operators("even sphere"), sources)

@@ -87,9 +87,12 @@ def test_fields_are_the_same(operators, monkeypatch):
     laplacian = operators("random square")
     fixed = np.flatnonzero(np.abs(laplacian.points[:, 0] - 0.5) > 0.47)
     values = np.sin(5.0 * laplacian.points[fixed, 1])
-    plain = core.harmonic_field(laplacian, fixed, values), core.smoothing_base(laplacian, dirichlet=True)
+    plain = core.distance.harmonic_field(laplacian, fixed, values), core.clean.smoothing_base(laplacian, dirichlet=True)
     monkeypatch.setattr(solvers, "_FEW", 0)
-    coarse = core.harmonic_field(laplacian, fixed, values), core.smoothing_base(laplacian, dirichlet=True)
+    coarse = (
+        core.distance.harmonic_field(laplacian, fixed, values),
+        core.clean.smoothing_base(laplacian, dirichlet=True),
+    )
     for one, other in zip(plain, coarse, strict=True):
         np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-7)  # plain steps end that far from the exact answer
 

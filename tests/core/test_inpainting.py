@@ -17,7 +17,7 @@ class TestInpaint:
         values = np.column_stack([np.full(60, 0.3), GIVEN.random(60)])
         values = np.column_stack([values, 1.0 - values.sum(axis=1)])
         for biharmonic in (True, False):
-            found = core.inpaint(laplacian, known, values, biharmonic=biharmonic)
+            found = core.rig.inpaint(laplacian, known, values, biharmonic=biharmonic)
             assert np.array_equal(found[known], values)
             assert np.abs(found[:, 0] - 0.3).max() < 1e-12
             assert np.abs(found.sum(axis=1) - 1.0).max() < 1e-10
@@ -26,7 +26,7 @@ class TestInpaint:
         points, laplacian = bar
         known = GIVEN.choice(len(points), 30, replace=False)
         values = GIVEN.random(30)
-        found = core.inpaint(laplacian, known, values, biharmonic=False)
+        found = core.rig.inpaint(laplacian, known, values, biharmonic=False)
         assert found.min() >= values.min() - 1e-12
         assert found.max() <= values.max() + 1e-12
 
@@ -36,7 +36,7 @@ class TestInpaint:
         middle, axis, half = axis_of(points)
         along = (points - middle) @ axis / half
         known = (np.abs(along) > 0.1) & (np.abs(along) < 0.3)
-        smooth, flat = (core.inpaint(laplacian, known, along[known], biharmonic=kind) for kind in (True, False))
+        smooth, flat = (core.rig.inpaint(laplacian, known, along[known], biharmonic=kind) for kind in (True, False))
         ends = np.abs(along) > 0.6
         assert np.abs(smooth - along)[ends].mean() < 0.5 * np.abs(flat - along)[ends].mean()
 
@@ -44,10 +44,10 @@ class TestInpaint:
         ball = fibonacci_sphere(800)
         laplacian = core.build_laplacian(np.concatenate([ball, ball + [3.0, 0, 0]]))
         known = np.array([0, 400, 800, 1200])
-        found = core.inpaint(laplacian, known, [0.0, 0.0, 1.0, 1.0])
+        found = core.rig.inpaint(laplacian, known, [0.0, 0.0, 1.0, 1.0])
         assert np.abs(found[:800]).max() < 1e-12
         assert np.abs(found[800:] - 1.0).max() < 1e-12
-        assert core.inpaint(laplacian, known[:2], [2.0, 2.0]) == pytest.approx(2.0)  # from the nearest known one
+        assert core.rig.inpaint(laplacian, known[:2], [2.0, 2.0]) == pytest.approx(2.0)  # from the nearest known one
 
     @pytest.mark.parametrize(
         ("known", "values", "text"),
@@ -55,14 +55,14 @@ class TestInpaint:
     )
     def test_bad_input_is_refused(self, bar, known, values, text):
         with pytest.raises(core.PointCloudError, match=text):
-            core.inpaint(bar[1], known, values)
+            core.rig.inpaint(bar[1], known, values)
 
 
 class TestSmoothWeights:
     def test_keeps_sums_and_range(self, bar):
         points, laplacian = bar
         hard = np.eye(3)[GIVEN.integers(0, 3, len(points))]
-        soft = core.smooth_weights(laplacian, hard, 0.5)
+        soft = core.rig.smooth_weights(laplacian, hard, 0.5)
         assert soft.min() >= 0.0
         assert np.abs(soft.sum(axis=1) - 1.0).max() < 1e-9
         assert soft.std() < 0.5 * hard.std()
@@ -72,7 +72,7 @@ class TestSmoothWeights:
         hard = np.eye(3)[GIVEN.integers(0, 3, len(points))]
         hard[:, 0], hard[:, 1:] = 0.25, 0.75 * hard[:, 1:] / np.maximum(hard[:, 1:].sum(axis=1, keepdims=True), 1e-9)
         hard[hard[:, 1:].sum(axis=1) == 0, 1] = 0.75
-        soft = core.smooth_weights(laplacian, hard, 0.5, locked=[0])
+        soft = core.rig.smooth_weights(laplacian, hard, 0.5, locked=[0])
         assert np.array_equal(soft[:, 0], hard[:, 0])
         assert np.abs(soft.sum(axis=1) - 1.0).max() < 1e-9
         assert np.abs(soft[:, 1] - hard[:, 1]).max() > 0.1
@@ -81,7 +81,9 @@ class TestSmoothWeights:
         points, laplacian = bar
         weights = np.tile([0.25, 0.75], (len(points), 1))
         weights[GIVEN.choice(len(points), 50, replace=False)] = 0.0
-        assert core.smooth_weights(laplacian, weights, 0.0) == pytest.approx(np.tile([0.25, 0.75], (len(points), 1)))
+        assert core.rig.smooth_weights(laplacian, weights, 0.0) == pytest.approx(
+            np.tile([0.25, 0.75], (len(points), 1))
+        )
 
     @pytest.mark.parametrize(
         ("change", "length", "text"),
@@ -91,4 +93,4 @@ class TestSmoothWeights:
         weights = np.ones((len(bar[0]), 2))
         weights[0, 0] = change
         with pytest.raises(core.PointCloudError, match=text):
-            core.smooth_weights(bar[1], weights, length)
+            core.rig.smooth_weights(bar[1], weights, length)

@@ -157,32 +157,40 @@ class Seen:
 def shifted(seen):
     """How far a body a little larger is from this one."""
     outer = random_sphere(300, 3)
-    return core.surface_deviation(seen.place(1.1 * bend(outer)), outer @ seen.turn, seen.on).distance / seen.scale
+    return (
+        core.measure.surface_deviation(seen.on, seen.place(1.1 * bend(outer)), outer @ seen.turn).distance / seen.scale
+    )
 
 
 USES = {
-    "harmonic field": lambda on: on.numbers(core.harmonic_field(on.on, on.rows([3, 500]), [0.0, 1.0])),
-    "potential": lambda on: on.numbers(core.solve_poisson(on.on, on.values, on.rows([3, 500]), 0.0), 2),
-    "distance": lambda on: on.numbers(core.geodesic_distance(on.on, on.rows([3, 500])), 1),
-    "grown": lambda on: on.numbers(core.grow(on.on, on.rows([3]), 0.5 * on.scale)),
-    "ends": lambda on: on.numbers(np.isin(np.arange(900), np.concatenate(core.opposite_ends(on.on)))),
-    "nearest source": lambda on: on.numbers(core.nearest_source(on.on, on.rows([3, 500]))),
-    "side of a curve": lambda on: on.numbers(core.signed_distance(on.on, on.rows([3, 500])), 1),
-    "transport": lambda on: on.vectors(core.transport(on.on, on.rows([3]), np.array([1.0, 2.0, 3.0]) @ on.turn)),
-    "map": lambda on: on.numbers(core.logarithmic_map(on.on, on.rows(3), np.array([1.0, 2.0, 3.0]) @ on.turn), 1),
-    "filter": lambda on: on.numbers(core.chebyshev_filter(on.on, on.values, core.exponential(0.1 * on.scale**2))),
-    "smooth": lambda on: on.places(core.smooth_points(on.on, 9)),
-    "fair": lambda on: on.places(core.fair_points(on.on)),
-    "heat": lambda on: on.numbers(core.heat_kernel_signature(on.on.eigenpairs(40)), -2),
-    "waves": lambda on: on.numbers(core.wave_kernel_signature(on.on.eigenpairs(40)), -2),
-    "domains": lambda on: on.numbers(core.nodal_domains(on.values, on.on)),
-    "parts": lambda on: on.numbers(core.segment(on.on, 3)),
-    "curvatures": lambda on: on.numbers(core.principal_curvatures(on.on).first, -1),
-    "directions": lambda on: on.axes(core.principal_curvatures(on.on).direction),
-    "deformed": lambda on: on.places(on.lifted(core.Deformer)),
-    "deformed linearly": lambda on: on.places(on.lifted(core.Deformer, rotation_aware=False)),
-    "variation": lambda on: on.numbers(core.surface_variation(on.on)),
-    "gradients": lambda on: on.matrices(core.deformation_gradients(on.on, on.on.points * 2.0 - on.shift)),
+    "harmonic field": lambda on: on.numbers(core.distance.harmonic_field(on.on, on.rows([3, 500]), [0.0, 1.0])),
+    "potential": lambda on: on.numbers(core.distance.solve_poisson(on.on, on.values, on.rows([3, 500]), 0.0), 2),
+    "distance": lambda on: on.numbers(core.distance.geodesic_distance(on.on, on.rows([3, 500])), 1),
+    "grown": lambda on: on.numbers(core.distance.grow(on.on, on.rows([3]), 0.5 * on.scale)),
+    "ends": lambda on: on.numbers(np.isin(np.arange(900), np.concatenate(core.distance.opposite_ends(on.on)))),
+    "nearest source": lambda on: on.numbers(core.distance.nearest_source(on.on, on.rows([3, 500]))),
+    "side of a curve": lambda on: on.numbers(core.distance.signed_distance(on.on, on.rows([3, 500])), 1),
+    "transport": lambda on: on.vectors(
+        core.distance.transport(on.on, on.rows([3]), np.array([1.0, 2.0, 3.0]) @ on.turn)
+    ),
+    "map": lambda on: on.numbers(
+        core.distance.logarithmic_map(on.on, on.rows(3), np.array([1.0, 2.0, 3.0]) @ on.turn), 1
+    ),
+    "filter": lambda on: on.numbers(
+        core.clean.chebyshev_filter(on.on, on.values, core.clean.exponential(0.1 * on.scale**2))
+    ),
+    "smooth": lambda on: on.places(core.clean.smooth_points(on.on, 9)),
+    "fair": lambda on: on.places(core.clean.fair_points(on.on)),
+    "heat": lambda on: on.numbers(core.spectral.heat_kernel_signature(on.on.eigenpairs(40)), -2),
+    "waves": lambda on: on.numbers(core.spectral.wave_kernel_signature(on.on.eigenpairs(40)), -2),
+    "domains": lambda on: on.numbers(core.spectral.nodal_domains(on.on, on.values)),
+    "parts": lambda on: on.numbers(core.spectral.segment(on.on, 3)),
+    "curvatures": lambda on: on.numbers(core.measure.principal_curvatures(on.on).first, -1),
+    "directions": lambda on: on.axes(core.measure.principal_curvatures(on.on).direction),
+    "deformed": lambda on: on.places(on.lifted(core.deform.Deformer)),
+    "deformed linearly": lambda on: on.places(on.lifted(core.deform.Deformer, rotation_aware=False)),
+    "variation": lambda on: on.numbers(core.measure.surface_variation(on.on)),
+    "gradients": lambda on: on.matrices(core.deform.deformation_gradients(on.on, on.on.points * 2.0 - on.shift)),
     "deviation": shifted,
 }
 

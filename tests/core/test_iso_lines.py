@@ -25,15 +25,15 @@ def grid(count):
 @pytest.fixture(scope="module")
 def sphere():
     laplacian = core.build_laplacian(random_sphere(2100))
-    mesh = core.mesh_surface(laplacian)
-    carrying = core.values_on_mesh(laplacian, mesh.vertices)
+    mesh = core.surface.mesh_surface(laplacian)
+    carrying = core.surface.values_on_mesh(laplacian, mesh.vertices)
     return mesh, carrying.interpolate(laplacian.points[:, 2])[-len(mesh.vertices) :]
 
 
 @pytest.mark.parametrize("height", [-0.9, -0.4, 0.0, 0.3, 0.8])
 def test_lines_of_height_on_a_sphere_are_circles_of_the_right_length(sphere, height):
     mesh, values = sphere
-    (line,) = core.iso_lines(*mesh, values, [height])
+    (line,) = core.measure.iso_lines(*mesh, values, [height])
     assert line.closed
     assert line.level == height
     assert_allclose(length(line), 2.0 * np.pi * np.sqrt(1.0 - height**2), rtol=0.02)
@@ -43,12 +43,12 @@ def test_lines_of_height_on_a_sphere_are_circles_of_the_right_length(sphere, hei
 
 def test_all_levels_come_one_after_the_other(sphere):
     levels = [-0.5, 0.0, 0.5, 3.0]
-    assert [line.level for line in core.iso_lines(*sphere[0], sphere[1], levels)] == levels[:3]
+    assert [line.level for line in core.measure.iso_lines(*sphere[0], sphere[1], levels)] == levels[:3]
 
 
 def test_lines_end_at_the_boundary():
     vertices, quads = grid(20)
-    (line,) = core.iso_lines(vertices, quads, vertices[:, 0], [0.13])
+    (line,) = core.measure.iso_lines(vertices, quads, vertices[:, 0], [0.13])
     assert not line.closed
     assert_allclose(length(line), 2.0)
     assert_allclose(np.sort(line.points[[0, -1], 1]), [-1.0, 1.0])
@@ -57,7 +57,9 @@ def test_lines_end_at_the_boundary():
 
 def test_corners_follow_each_other():
     vertices, quads = grid(60)
-    lines = core.iso_lines(vertices, quads, np.sin(7.0 * vertices[:, 0]) * np.cos(9.0 * vertices[:, 1]), [0.3, -0.2])
+    lines = core.measure.iso_lines(
+        vertices, quads, np.sin(7.0 * vertices[:, 0]) * np.cos(9.0 * vertices[:, 1]), [0.3, -0.2]
+    )
     assert len(lines) > 20
     assert {line.closed for line in lines} == {True, False}
     for line in lines:
@@ -67,15 +69,15 @@ def test_corners_follow_each_other():
 
 def test_levels_that_vertices_have_break_no_line():
     vertices, quads = grid(21)
-    (line,) = core.iso_lines(vertices, quads, vertices[:, 0], [0.0])
+    (line,) = core.measure.iso_lines(vertices, quads, vertices[:, 0], [0.0])
     assert_allclose(length(line), 2.0)
-    assert not core.iso_lines(vertices, quads, 0.0 * vertices[:, 0], [0.0])
+    assert not core.measure.iso_lines(vertices, quads, 0.0 * vertices[:, 0], [0.0])
 
 
 def test_across_unknown_values_there_are_none():
     vertices, quads = grid(21)
     values = np.where(np.abs(vertices[:, 1]) < 0.25, np.nan, vertices[:, 0])
-    lines = core.iso_lines(vertices, quads, values, [0.03])
+    lines = core.measure.iso_lines(vertices, quads, values, [0.03])
     assert [line.closed for line in lines] == [False, False]
     assert_allclose(sum(map(length, lines)), 2.0 - 0.6, atol=1e-6)
 
@@ -83,7 +85,7 @@ def test_across_unknown_values_there_are_none():
 def test_where_three_sheets_meet_lines_end():
     vertices = np.array([[0.0, 0, 0], [1.0, 0, 0], [0.0, 1, 0], [0.0, -1, 0], [0.0, 0, 1]])
     faces = np.array([[0, 1, 2], [0, 1, 3], [0, 1, 4]])
-    lines = core.iso_lines(vertices, faces, vertices[:, 0], [0.5])
+    lines = core.measure.iso_lines(vertices, faces, vertices[:, 0], [0.5])
     assert len(lines) == 3
     assert not any(line.closed for line in lines)
     assert_allclose([length(line) for line in lines], 0.5)
@@ -100,4 +102,4 @@ def test_where_three_sheets_meet_lines_end():
 )
 def test_wrong_arrays_are_refused(faces, values, levels, text):
     with pytest.raises(core.PointCloudError, match=text):
-        core.iso_lines(np.eye(3), np.array(faces), np.array(values), levels)
+        core.measure.iso_lines(np.eye(3), np.array(faces), np.array(values), levels)

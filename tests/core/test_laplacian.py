@@ -132,12 +132,12 @@ class TestMeanCurvature:
     def test_sphere(self, radius):
         points = radius * fibonacci_sphere(1500) + [1.0, 2.0, 3.0]
         laplacian = core.build_laplacian(points)
-        np.testing.assert_allclose(core.mean_curvature(laplacian), 1.0 / radius, rtol=2e-2)
+        np.testing.assert_allclose(core.measure.mean_curvature(laplacian), 1.0 / radius, rtol=2e-2)
 
     def test_up_to_the_boundary_of_a_hemisphere(self):
         laplacian = core.build_laplacian(hemisphere_random(750))
         assert laplacian.boundary.any()
-        np.testing.assert_allclose(core.mean_curvature(laplacian), 1.0, rtol=0.1)
+        np.testing.assert_allclose(core.measure.mean_curvature(laplacian), 1.0, rtol=0.1)
 
 
 class TestProgress:

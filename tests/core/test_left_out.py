@@ -63,8 +63,8 @@ def test_uses_of_the_operator_know_points_left_out():
     alone = core.build_laplacian(points[~out], options=options)
     np.testing.assert_allclose(part.eigenpairs(6).eigenvalues, alone.eigenpairs(6).eigenvalues, rtol=1e-6, atol=1e-6)
     source = np.flatnonzero(~out)[:1]
-    distance = core.geodesic_distance(part, source)[~out]
-    np.testing.assert_allclose(distance, core.geodesic_distance(alone, [0]), rtol=1e-6, atol=1e-9)
+    distance = core.distance.geodesic_distance(part, source)[~out]
+    np.testing.assert_allclose(distance, core.distance.geodesic_distance(alone, [0]), rtol=1e-6, atol=1e-9)
     narrow = narrow_laplacian(part)
     assert (narrow.component[out] == -1).all()
 

@@ -45,7 +45,7 @@ def test_signs_and_order_of_shuffled_points_come_back(sphere):
     random = np.random.default_rng(0)
     order, signs = random.permutation(len(points)), random.choice([-1.0, 1.0], COUNT)
     shuffled = Spectrum(spectrum.eigenvalues, (spectrum.eigenvectors * signs)[order])
-    matched = core.match_modes(shuffled, areas[order], points[order], spectrum, points, tolerance=0.0)
+    matched = core.spectral.match_modes(shuffled, areas[order], points[order], spectrum, points, tolerance=0.0)
     assert_allclose(matched.spectrum.eigenvectors, spectrum.eigenvectors[order], atol=1e-12)
     assert_allclose(matched.spectrum.eigenvalues, spectrum.eigenvalues, rtol=1e-12, atol=1e-12)
     assert_allclose(matched.overlaps, 1.0, atol=1e-12)
@@ -58,7 +58,7 @@ def test_any_basis_of_equal_eigenvalues_is_turned_back(sphere):
     for start, stop in ((1, 4), (4, 9)):
         basis[start:stop, start:stop] = np.linalg.qr(random.normal(size=(stop - start, stop - start)))[0]
     mixed = Spectrum(spectrum.eigenvalues, spectrum.eigenvectors @ basis)
-    matched = core.match_modes(mixed, areas, points, spectrum, points, tolerance=0.05)
+    matched = core.spectral.match_modes(mixed, areas, points, spectrum, points, tolerance=0.05)
     assert_allclose(matched.spectrum.eigenvectors, spectrum.eigenvectors, atol=1e-10)
 
 
@@ -71,7 +71,9 @@ def test_harmonics_of_a_turned_and_resampled_sphere_stay_in_place(sphere):
     harmonics = np.column_stack([np.ones(len(x)), x, y, z, x * y, y * z, z * x, x**2 - y**2, 3 * z**2 - 1])
     harmonics /= np.sqrt(np.sum(areas[:, None] * harmonics**2, axis=0))
     before = Spectrum(np.array([0.0, *[2.0] * 3, *[6.0] * 5]), harmonics)
-    matched = core.match_modes(laplacian.eigenpairs(COUNT), laplacian.areas, other, before, points, tolerance=0.1)
+    matched = core.spectral.match_modes(
+        laplacian.eigenpairs(COUNT), laplacian.areas, other, before, points, tolerance=0.1
+    )
     assert matched.overlaps.min() > 0.99
     x, y, z = other.T
     for mode, values in enumerate((x, y, z), start=1):
@@ -91,7 +93,7 @@ def test_modes_that_cross_keep_their_places():
         exact, names = box_modes(now, lengths)
         orders.add(tuple(names))
         areas = np.full(len(now), np.prod(lengths) / len(now))
-        matched = core.match_modes(exact, areas, now, spectrum, points, tolerance=1e-3)
+        matched = core.spectral.match_modes(exact, areas, now, spectrum, points, tolerance=1e-3)
         assert matched.overlaps[:3].min() > 0.97
         points, spectrum = now, matched.spectrum
         expected = np.pi**2 * np.array([(m / lengths[0]) ** 2 + (k / lengths[1]) ** 2 for m, k in named[:3]])
@@ -108,7 +110,7 @@ def test_an_ellipsoid_whose_axes_change_places_keeps_its_modes():
         spectrum = laplacian.eigenpairs(4)
         ranks.append(abs(np.corrcoef(spectrum.eigenvectors[:, 1], points[:, 0])[0, 1]) > 0.9)
         if before is not None:
-            matched = core.match_modes(spectrum, laplacian.areas, points, *before)
+            matched = core.spectral.match_modes(spectrum, laplacian.areas, points, *before)
             assert matched.overlaps.min() > 0.95
             spectrum = matched.spectrum
         else:
@@ -124,8 +126,8 @@ def test_scale_and_turn_of_both_frames_change_nothing(sphere):
     moved = 7.0 * turned(points) + [3.0, -2.0, 5.0]
     far = Spectrum(spectrum.eigenvalues / 49.0, spectrum.eigenvectors / 7.0)
     far_flipped = Spectrum(far.eigenvalues, -far.eigenvectors)
-    here = core.match_modes(flipped, areas, points, spectrum, points)
-    there = core.match_modes(far_flipped, 49.0 * areas, moved, far, moved)
+    here = core.spectral.match_modes(flipped, areas, points, spectrum, points)
+    there = core.spectral.match_modes(far_flipped, 49.0 * areas, moved, far, moved)
     assert_allclose(7.0 * there.spectrum.eigenvectors, here.spectrum.eigenvectors, atol=1e-12)
     assert_allclose(there.overlaps, here.overlaps)
 
@@ -136,7 +138,7 @@ def test_high_modes_are_not_all_taken_for_one():
     vectors = np.linalg.qr(np.random.default_rng(2).normal(size=(1200, 400)))[0]
     points = np.random.default_rng(3).uniform(size=(1200, 3))
     spectrum = Spectrum(values, vectors)
-    matched = core.match_modes(Spectrum(values, -vectors), np.ones(1200), points, spectrum, points)
+    matched = core.spectral.match_modes(Spectrum(values, -vectors), np.ones(1200), points, spectrum, points)
     assert_allclose(matched.spectrum.eigenvectors, vectors, atol=1e-9)
     assert_allclose(matched.spectrum.eigenvalues, values, atol=1e-9)
 
@@ -158,4 +160,4 @@ def test_what_does_not_fit_is_told(sphere, change, error, text):
         "points_before": points,
     }
     with pytest.raises(error, match=text):
-        core.match_modes(**given | change)
+        core.spectral.match_modes(**given | change)

@@ -60,21 +60,21 @@ def bumpy_sphere(count, seed=0):
 class TestOnSpheres:
     @pytest.mark.parametrize(("level", "most"), [(0.0, 0.008), (0.01, 0.02), (0.02, 0.03), (0.1, 0.05), (0.2, 0.1)])
     def test_random_points(self, level, most):
-        found = core.mean_curvature(core.build_laplacian(noisy_sphere(random_sphere(8000), level)))
+        found = core.measure.mean_curvature(core.build_laplacian(noisy_sphere(random_sphere(8000), level)))
         assert off(found, 1.0) < most
 
     @pytest.mark.parametrize(("level", "most"), [(0.0, 3e-4), (0.01, 0.02), (0.02, 0.04), (0.1, 0.06), (0.2, 0.12)])
     def test_even_points(self, level, most):
-        found = core.mean_curvature(core.build_laplacian(noisy_sphere(fibonacci_sphere(8000), level)))
+        found = core.measure.mean_curvature(core.build_laplacian(noisy_sphere(fibonacci_sphere(8000), level)))
         assert off(found, 1.0) < most
 
     def test_scatter_is_what_noise_leaves(self):
         for level in (0.02, 0.1, 0.2):
-            found = core.measure_mean_curvature(core.build_laplacian(noisy_sphere(random_sphere(8000), level)))
+            found = core.measure.measure_mean_curvature(core.build_laplacian(noisy_sphere(random_sphere(8000), level)))
             assert 0.5 < off(found.values, 1.0) / np.sqrt(np.mean(found.scatter**2)) < 2.0
 
     def test_half_the_difference_does_not_add_up_from_noise(self):
-        found = core.principal_curvatures(core.build_laplacian(noisy_sphere(random_sphere(8000), 0.1)))
+        found = core.measure.principal_curvatures(core.build_laplacian(noisy_sphere(random_sphere(8000), 0.1)))
         assert 0.5 * np.mean(found.first - found.second) < 0.04
         assert off(found.curvedness, 1.0) < 0.05
         assert found.shape_index.min() > 0.9
@@ -85,9 +85,9 @@ def test_torus(level, mean, half):
     points = torus_points(20_000)
     exact, difference, normals = torus_curvature(points)
     laplacian = core.build_laplacian(noisy(points, normals, level, 1.6 * np.pi**2))
-    found = core.principal_curvatures(laplacian)
-    np.testing.assert_allclose(0.5 * (found.first + found.second), core.mean_curvature(laplacian), atol=1e-9)
-    assert off(core.mean_curvature(laplacian), exact) < mean
+    found = core.measure.principal_curvatures(laplacian)
+    np.testing.assert_allclose(0.5 * (found.first + found.second), core.measure.mean_curvature(laplacian), atol=1e-9)
+    assert off(core.measure.mean_curvature(laplacian), exact) < mean
     assert off(0.5 * (found.first - found.second), difference) < half
     assert found.notices == []
 
@@ -97,7 +97,7 @@ def test_bumps_are_not_averaged_away(level, most):
     points, normals, exact, area = bumpy_sphere(12_000)
     laplacian = core.build_laplacian(noisy(points, normals, level, area))
     on = laplacian.component >= 0
-    assert off(core.mean_curvature(laplacian)[on], exact[on]) < most
+    assert off(core.measure.mean_curvature(laplacian)[on], exact[on]) < most
 
 
 def test_edges_keep_their_curvature():
@@ -110,7 +110,7 @@ def test_edges_keep_their_curvature():
     points = np.unique(np.round(np.concatenate(faces), 9), axis=0)
     points = points + np.random.default_rng(0).normal(0.0, 0.05 / 59.0, points.shape)
     laplacian = core.build_laplacian(points)
-    found = np.abs(core.mean_curvature(laplacian))
+    found = np.abs(core.measure.mean_curvature(laplacian))
     depth = np.sort(0.5 - np.abs(points), axis=1)[:, 1] * 59.0  # spacings from the nearest edge
     corners = np.sort(0.5 - np.abs(points), axis=1)[:, 2] * 59.0 < 8.0
     edges, inner = found[(depth < 0.5) & ~corners], found[depth > 12.0]
@@ -132,7 +132,7 @@ class TestPrincipalCurvaturesOfNoisySheets:
         mean = ((1.0 + (second * y) ** 2) * first + (1.0 + (first * x) ** 2) * second) / (2.0 * tilt**1.5)
         half = np.sqrt(np.maximum(mean**2 - first * second / tilt**2, 0.0))
         options = core.LaplacianOptions(bandwidth_factor=factor)
-        found = core.principal_curvatures(core.build_laplacian(np.column_stack([x, y, z]), options=options))
+        found = core.measure.principal_curvatures(core.build_laplacian(np.column_stack([x, y, z]), options=options))
         inner = np.maximum(np.abs(x), np.abs(y)) < 0.85
         return off(0.5 * (found.first - found.second)[inner], half[inner]), found, inner
 
@@ -160,21 +160,21 @@ class TestNotices:
 
     def test_noise_decides_on_a_plate(self):
         laplacian = core.build_laplacian(self.plate(0.1))
-        for found in (core.measure_mean_curvature(laplacian), core.principal_curvatures(laplacian)):
+        for found in (core.measure.measure_mean_curvature(laplacian), core.measure.principal_curvatures(laplacian)):
             [notice] = found.notices
             assert notice.startswith("Noise decides the ")
             assert "bandwidth_factor" in notice
 
     def test_nothing_does_on_an_exact_one(self):
         laplacian = core.build_laplacian(self.plate(0.0))
-        assert core.measure_mean_curvature(laplacian).notices == []
-        assert core.principal_curvatures(laplacian).notices == []
+        assert core.measure.measure_mean_curvature(laplacian).notices == []
+        assert core.measure.principal_curvatures(laplacian).notices == []
 
     @pytest.mark.parametrize("level", [0.0, 0.1, 0.2])
     def test_nor_on_a_sphere(self, level):
         laplacian = core.build_laplacian(noisy_sphere(random_sphere(3000), level))
-        assert core.measure_mean_curvature(laplacian).notices == []
-        assert core.principal_curvatures(laplacian).notices == []
+        assert core.measure.measure_mean_curvature(laplacian).notices == []
+        assert core.measure.principal_curvatures(laplacian).notices == []
 
 
 @functools.cache
@@ -182,7 +182,7 @@ def noisy_torus():
     """The operator on noisy points of a torus, and its principal curvatures."""
     points = torus_points(4000)
     laplacian = core.build_laplacian(noisy(points, torus_curvature(points)[2], 0.1, 1.6 * np.pi**2))
-    return laplacian, core.principal_curvatures(laplacian)
+    return laplacian, core.measure.principal_curvatures(laplacian)
 
 
 class TestInvariance:
@@ -192,20 +192,20 @@ class TestInvariance:
         order = np.random.default_rng(0).permutation(len(points))
         turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
         turn *= np.sign(np.linalg.det(turn))
-        found = core.principal_curvatures(core.build_laplacian(1e3 * (points @ turn.T)[order] + 5e3))
+        found = core.measure.principal_curvatures(core.build_laplacian(1e3 * (points @ turn.T)[order] + 5e3))
         for name in ("first", "second", "scatter"):
             np.testing.assert_allclose(1e3 * getattr(found, name), getattr(known, name)[order], atol=1e-6)
 
     def test_sign_of_normals(self):
         laplacian, known = noisy_torus()
-        found = core.principal_curvatures(laplacian.toward(-laplacian.normals))
+        found = core.measure.principal_curvatures(laplacian.toward(-laplacian.normals))
         np.testing.assert_allclose(found.first, -known.second, atol=1e-9)
         np.testing.assert_allclose(found.second, -known.first, atol=1e-9)
 
     def test_normals_of_mixed_signs(self):
         laplacian, known = noisy_torus()
         side = np.where(np.arange(len(laplacian.points)) % 3 == 0, -1.0, 1.0)[:, None]
-        found = core.mean_curvature(laplacian.toward(side * laplacian.normals))
+        found = core.measure.mean_curvature(laplacian.toward(side * laplacian.normals))
         np.testing.assert_allclose(side[:, 0] * found, 0.5 * (known.first + known.second), atol=1e-9)
 
 

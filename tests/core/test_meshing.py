@@ -46,7 +46,7 @@ def typical_spacing(laplacian):
 @pytest.fixture(scope="module")
 def meshes(operators):
     """Function from the name of a cloud and a detail to the mesh of its surface."""
-    return functools.cache(lambda name, detail=1.0: core.mesh_surface(operators(name), detail))
+    return functools.cache(lambda name, detail=1.0: core.surface.mesh_surface(operators(name), detail))
 
 
 @pytest.mark.parametrize(
@@ -84,7 +84,7 @@ def test_torus(operators, meshes, name):
 def test_open_cap_keeps_its_rim(sphere):
     points = sphere(2000)
     laplacian = core.build_laplacian(points[points[:, 2] > 0.3])
-    mesh = core.mesh_surface(laplacian)
+    mesh = core.surface.mesh_surface(laplacian)
     assert euler_characteristic(mesh) == 1  # that of a disc
     assert area_of(mesh) == pytest.approx(2.0 * np.pi * 0.7, rel=0.03)
     assert mesh.vertices[:, 2].min() == pytest.approx(0.3, abs=0.5 * typical_spacing(laplacian))
@@ -92,14 +92,14 @@ def test_open_cap_keeps_its_rim(sphere):
 
 def test_flat_square_stays_flat():
     laplacian = core.build_laplacian(square_random(1200))
-    mesh = core.mesh_surface(laplacian)
+    mesh = core.surface.mesh_surface(laplacian)
     assert np.abs(mesh.vertices[:, 2]).max() < 1e-9
     assert area_of(mesh) == pytest.approx(1.0, rel=0.03)
 
 
 def test_sheets_apart_are_two_meshes():
     ball = fibonacci_sphere(750)
-    mesh = core.mesh_surface(core.build_laplacian(np.concatenate([ball, ball + [2.5, 0.0, 0.0]])))
+    mesh = core.surface.mesh_surface(core.build_laplacian(np.concatenate([ball, ball + [2.5, 0.0, 0.0]])))
     assert np.all(edges_of(mesh) == 2)
     assert euler_characteristic(mesh) == 4
 
@@ -107,7 +107,7 @@ def test_sheets_apart_are_two_meshes():
 def test_sheets_within_one_voxel_share_no_vertex():
     turn = Rotation.from_rotvec([0.4, 0.3, 0.2]).as_matrix()
     laplacian = core.build_laplacian(fibonacci_sphere(3000) * [1.0, 0.8, 0.085] @ turn)
-    mesh = core.mesh_surface(laplacian)
+    mesh = core.surface.mesh_surface(laplacian)
     assert np.all(edges_of(mesh) == 2)
     assert euler_characteristic(mesh) == 2
 
@@ -126,7 +126,7 @@ def test_signs_of_normals_make_no_holes(operators, meshes, turned):
         normals=laplacian.normals * sign[:, None],
         shape_operator=laplacian.shape_operator * sign[:, None, None],
     )
-    one, mesh = meshes("another random sphere"), core.mesh_surface(other)
+    one, mesh = meshes("another random sphere"), core.surface.mesh_surface(other)
     assert np.all(edges_of(mesh) == 2)
     assert euler_characteristic(mesh) == 2
     np.testing.assert_allclose(np.sort(np.linalg.norm(mesh.vertices, axis=1)), 1.0, atol=5e-3)
@@ -139,7 +139,7 @@ def test_surface_ends_at_sharp_rims():
     sides = np.array([1.0, 1.0, 0.057])  # some two spacings thick
     points = box(sides, 4000)
     laplacian = core.build_laplacian(points)
-    mesh = core.mesh_surface(laplacian)
+    mesh = core.surface.mesh_surface(laplacian)
     assert np.all(edges_of(mesh) == 2)
     assert euler_characteristic(mesh) == 2
     spacing = typical_spacing(laplacian)
@@ -171,23 +171,23 @@ def test_places_that_no_edge_joins_stay_apart():
 def test_order_of_the_points_makes_no_difference(operators, meshes):
     points, one = operators("another random sphere").points, meshes("another random sphere")
     order = np.random.default_rng(1).permutation(len(points))
-    other = core.mesh_surface(core.build_laplacian(points[order]))
+    other = core.surface.mesh_surface(core.build_laplacian(points[order]))
     np.testing.assert_allclose(other.vertices, one.vertices, atol=1e-6)
     assert np.array_equal(other.faces, one.faces)
 
 
 def test_scale_and_place_only_scale_and_move():
     points = fibonacci_sphere(750)
-    one, other = (core.mesh_surface(core.build_laplacian(cloud)) for cloud in (points, 1024.0 * points))
+    one, other = (core.surface.mesh_surface(core.build_laplacian(cloud)) for cloud in (points, 1024.0 * points))
     np.testing.assert_allclose(other.vertices, 1024.0 * one.vertices, atol=1e-6)
-    moved = core.mesh_surface(core.build_laplacian(1e-3 * points + [50.0, -20.0, 7.0]))
+    moved = core.surface.mesh_surface(core.build_laplacian(1e-3 * points + [50.0, -20.0, 7.0]))
     np.testing.assert_allclose(np.linalg.norm(moved.vertices - [50.0, -20.0, 7.0], axis=1), 1e-3, rtol=1e-3)
 
 
 def test_turned_points_give_the_same_surface():
     turn = Rotation.from_rotvec([0.3, -0.5, 0.8]).as_matrix()
     points = fibonacci_sphere(1500) * [1.0, 0.7, 0.5]
-    mesh = core.mesh_surface(core.build_laplacian(points @ turn.T))
+    mesh = core.surface.mesh_surface(core.build_laplacian(points @ turn.T))
     assert np.all(edges_of(mesh) == 2)
     on = np.linalg.norm((mesh.vertices @ turn) / [1.0, 0.7, 0.5], axis=1)
     np.testing.assert_allclose(on, 1.0, atol=2e-3)
@@ -195,7 +195,7 @@ def test_turned_points_give_the_same_surface():
 
 def test_values_are_carried_along_the_surface(operators, meshes):
     laplacian, mesh = operators("random sphere"), meshes("random sphere")
-    carried = core.values_on_mesh(laplacian, mesh.vertices).interpolate(laplacian.points)
+    carried = core.surface.values_on_mesh(laplacian, mesh.vertices).interpolate(laplacian.points)
     assert len(carried) == len(laplacian.points) + len(mesh.vertices)
     np.testing.assert_allclose(carried[len(laplacian.points) :], mesh.vertices, atol=0.01)
 
@@ -203,17 +203,17 @@ def test_values_are_carried_along_the_surface(operators, meshes):
 @pytest.mark.parametrize("detail", [0.0, -1.0, np.nan, np.inf, "fine", True])
 def test_wrong_detail(operators, detail):
     with pytest.raises(core.PointCloudError, match="detail"):
-        core.mesh_surface(operators("even sphere"), detail)
+        core.surface.mesh_surface(operators("even sphere"), detail)
 
 
 def test_detail_that_no_memory_holds(operators):
     with pytest.raises(core.NotEnoughMemoryError, match="Lower the detail"):
-        core.mesh_surface(operators("even sphere"), 1e5)
+        core.surface.mesh_surface(operators("even sphere"), 1e5)
 
 
 def test_detail_coarser_than_the_surface(operators):
     with pytest.raises(core.PointCloudError, match="raise the detail"):
-        core.mesh_surface(operators("even sphere"), 1e-3)
+        core.surface.mesh_surface(operators("even sphere"), 1e-3)
 
 
 def two_sheets(ratio, count=900, seed=0):
@@ -245,7 +245,7 @@ class TestDensitiesThatMeet:
     @pytest.mark.parametrize("half", [2.0, 10.0, 40.0])
     def test_a_statue_on_a_plaza(self, half):
         points = self.statue(3000, 800, half)
-        mesh = core.mesh_surface(core.build_laplacian(points))
+        mesh = core.surface.mesh_surface(core.build_laplacian(points))
         assert mesh.notices == []
         assert len(mesh.faces) < 4 * len(points)
         low = mesh.vertices[mesh.faces].mean(axis=1)[:, 2] < 0.2
@@ -257,7 +257,7 @@ class TestDensitiesThatMeet:
         assert np.abs(np.linalg.norm(mesh.vertices[statue] - [0.0, 0.0, 0.6], axis=1) - 0.25).max() < 1e-3
 
     def test_a_dense_part_that_is_small_is_not_lost(self):
-        mesh = core.mesh_surface(core.build_laplacian(self.statue(1500, 6000, 10.0)))
+        mesh = core.surface.mesh_surface(core.build_laplacian(self.statue(1500, 6000, 10.0)))
         low = mesh.vertices[mesh.faces].mean(axis=1)[:, 2] < 0.2
         assert np.linalg.norm(areas_of(mesh), axis=1)[~low].sum() == pytest.approx(np.pi / 4.0, rel=0.02)
 
@@ -265,7 +265,7 @@ class TestDensitiesThatMeet:
     def test_side_by_side(self, ratio):
         points = two_sheets(ratio)
         laplacian = core.build_laplacian(points)
-        mesh = core.mesh_surface(laplacian)
+        mesh = core.surface.mesh_surface(laplacian)
         assert len(mesh.faces) < 6 * len(points)
         assert edges_of(mesh).max() == 2
         assert np.abs(mesh.vertices[:, 2]).max() < 1e-6
@@ -278,16 +278,16 @@ class TestDensitiesThatMeet:
         points = hopf_torus(60, 30, height=height)
         laplacian = core.build_laplacian(points)
         assert laplacian.areas.max() > 30.0 * laplacian.areas.min()
-        mesh = core.mesh_surface(laplacian)
+        mesh = core.surface.mesh_surface(laplacian)
         assert np.all(edges_of(mesh) == 2)
         assert euler_characteristic(mesh) == 0
         assert len(mesh.faces) < 6 * len(points)
-        assert area_of(mesh) == pytest.approx(area_of(core.SurfaceMesh(*fine_hopf_torus(height))), rel=0.03)
+        assert area_of(mesh) == pytest.approx(area_of(core.surface.SurfaceMesh(*fine_hopf_torus(height))), rel=0.03)
 
     def test_components_of_all_sizes(self):
         ball = fibonacci_sphere(800)
         points = np.concatenate([ball * size + [3.0 * place, 0.0, 0.0] for place, size in enumerate((1.0, 0.1, 0.01))])
-        mesh = core.mesh_surface(core.build_laplacian(points))
+        mesh = core.surface.mesh_surface(core.build_laplacian(points))
         assert np.all(edges_of(mesh) == 2)
         assert euler_characteristic(mesh) == 6
         for place, size in enumerate((1.0, 0.1, 0.01)):
@@ -300,7 +300,7 @@ class TestDensitiesThatMeet:
         for half in 2.0, 10.0, 40.0:
             laplacian = core.build_laplacian(self.statue(3000, 800, half))
             with pytest.raises(core.NotEnoughMemoryError) as caught:
-                core.mesh_surface(laplacian)
+                core.surface.mesh_surface(laplacian)
             needed.append(float(str(caught.value).partition(" about ")[2].split()[0]))
         assert max(needed) < 0.1  # GB
 
@@ -312,7 +312,7 @@ class TestDensitiesThatMeet:
         sparse = rng.random((40, 2)) * [63.2, 63.2]
         points = np.pad(np.concatenate([dense, sparse]), ((0, 0), (0, 1)))
         points[:, 2] = 6.0 * np.sin(0.05 * points[:, 0])
-        mesh = core.mesh_surface(core.build_laplacian(points))
+        mesh = core.surface.mesh_surface(core.build_laplacian(points))
         assert len(mesh.faces) < 2.5 * len(points)
         assert len(grids[0].corners) < 10 * len(points)
 
@@ -323,10 +323,10 @@ class TestDensitiesThatMeet:
         with monkeypatch.context() as patch:
             patch.setattr(meshing, "available_memory", lambda: 1)
             with pytest.raises(core.NotEnoughMemoryError) as caught:
-                core.mesh_surface(laplacian, detail)
+                core.surface.mesh_surface(laplacian, detail)
         expected = float(str(caught.value).partition(" about ")[2].split()[0]) * 2.0**30
         tracemalloc.start()
-        core.mesh_surface(laplacian, detail)
+        core.surface.mesh_surface(laplacian, detail)
         peak = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         assert 0.5 * peak < expected < 2.0 * peak
@@ -334,7 +334,7 @@ class TestDensitiesThatMeet:
     def test_points_without_a_mesh_are_told(self):
         cube = np.random.default_rng(2).uniform(-0.4, 0.4, (1200, 3)) + [3.0, 0.0, 0.0]
         laplacian = core.build_laplacian(np.concatenate([random_sphere(2000), cube]))
-        (notice,) = core.mesh_surface(laplacian).notices
+        (notice,) = core.surface.mesh_surface(laplacian).notices
         number = int(notice.split()[3].replace(",", ""))
         assert 0.1 * len(cube) < number < len(cube)
 
@@ -357,7 +357,7 @@ class TestQuads:
         assert all(len(set(quad)) == 4 for quad in quads.tolist())
         np.testing.assert_array_equal(vertices[:6], places)
         assert len(sizes) == len(vertices)
-        mesh = core.SurfaceMesh(vertices, quads)
+        mesh = core.surface.SurfaceMesh(vertices, quads)
         assert area_of(mesh) == pytest.approx(2.0)
         assert np.all(areas_of(mesh)[:, 2] > 0.0)
 
@@ -365,13 +365,13 @@ class TestQuads:
     def test_a_closed_surface_of_triangles_and_quads(self, seed):
         # A cube of quads, some of which are divided to two triangles, wherever they lie.
         rng = np.random.default_rng(seed)
-        mesh = core.mesh_surface(core.build_laplacian(fibonacci_sphere(400)))
+        mesh = core.surface.mesh_surface(core.build_laplacian(fibonacci_sphere(400)))
         cut = rng.random(len(mesh.faces)) < rng.choice([0.01, 0.2, 1.0])
         cut[rng.integers(len(cut))] = True
         a, b, c, d = mesh.faces[cut].T
         faces = np.concatenate([mesh.faces[~cut], np.stack([a, b, c, c], axis=1), np.stack([c, d, a, a], axis=1)])
         vertices, quads, _ = all_quads(mesh.vertices, faces[rng.permutation(len(faces))], np.ones(len(mesh.vertices)))
-        made = core.SurfaceMesh(vertices, quads)
+        made = core.surface.SurfaceMesh(vertices, quads)
         assert all(len(set(quad)) == 4 for quad in quads.tolist())
         assert np.all(edges_of(made) == 2)
         assert euler_characteristic(made) == 2
@@ -382,4 +382,4 @@ class TestQuads:
         places = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0.5, 0]], dtype=float)
         vertices, quads, _ = all_quads(places, np.array([[0, 1, 2, 3], [1, 4, 2, 2]]), np.ones(5))
         assert all(len(set(quad)) == 4 for quad in quads.tolist())
-        assert area_of(core.SurfaceMesh(vertices, quads)) == pytest.approx(1.5)
+        assert area_of(core.surface.SurfaceMesh(vertices, quads)) == pytest.approx(1.5)

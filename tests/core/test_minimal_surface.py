@@ -18,14 +18,14 @@ def cylinder():
 
 @pytest.fixture(scope="module")
 def settled(cylinder):
-    return core.minimal_surface(*cylinder)
+    return core.deform.minimal_surface(*cylinder)
 
 
 @pytest.fixture(scope="module")
 def coarse():
     """A smaller one, and what becomes of it."""
     points, fixed = tube(48, 10)
-    return points, fixed, core.minimal_surface(points, fixed)
+    return points, fixed, core.deform.minimal_surface(points, fixed)
 
 
 def circle(count, radius=1.0):
@@ -61,7 +61,7 @@ class TestCatenoid:
 
     def test_nothing_changes_in_further_steps(self, coarse):
         _, fixed, settled = coarse
-        further = core.minimal_surface(settled.points, fixed, epsilon=0.0, max_steps=5)
+        further = core.deform.minimal_surface(settled.points, fixed, epsilon=0.0, max_steps=5)
         assert further.steps == 5
         assert not further.converged
         assert np.abs(further.points - settled.points).max() < 1e-3
@@ -71,7 +71,7 @@ class TestCatenoid:
         angle, z = 2.0 * np.pi * random.random(900), 2.0 * random.random(900) - 1.0
         rings = np.concatenate([circle(75, 2.0) - [0, 0, 1], circle(75, 2.0) + [0, 0, 1]])
         points = np.concatenate([rings, np.column_stack([2.0 * np.cos(angle), 2.0 * np.sin(angle), z])])
-        film = core.minimal_surface(points, np.arange(150))
+        film = core.deform.minimal_surface(points, np.arange(150))
         assert film.converged
         area, waist, profile = catenoid_errors(film.points, film.areas)
         assert abs(area) < 1e-2
@@ -81,7 +81,7 @@ class TestCatenoid:
     def test_noise_is_smoothed(self):
         points, fixed = tube(60, 12)
         points += 0.02 * np.random.default_rng(0).standard_normal(points.shape) * ~fixed[:, None]
-        film = core.minimal_surface(points, fixed)
+        film = core.deform.minimal_surface(points, fixed)
         assert film.converged
         assert catenoid_errors(film.points, film.areas)[2] < 1e-2
 
@@ -93,13 +93,13 @@ class TestFlat:
         radius = np.sqrt(1.0 - deepest**2)
         ring = circle(round(43 * radius), radius) + [0.0, 0.0, deepest]
         points = np.concatenate([ring, points[points[:, 2] > deepest + 0.05]])
-        film = core.minimal_surface(points, np.arange(len(ring)))
+        film = core.deform.minimal_surface(points, np.arange(len(ring)))
         assert film.converged
         assert np.abs(film.points[:, 2] - deepest).max() < 1e-2
         assert film.areas.sum() == pytest.approx(np.pi * radius**2, rel=5e-3)
 
     def test_random_hemisphere(self):
-        film = core.minimal_surface(*cap(hemisphere_random(600), 50))
+        film = core.deform.minimal_surface(*cap(hemisphere_random(600), 50))
         assert film.converged
         assert np.abs(film.points[:, 2]).max() < 1e-2
         assert film.areas.sum() == pytest.approx(np.pi, rel=5e-3)
@@ -111,7 +111,7 @@ class TestFlat:
         across = np.minimum(box, 1.0 - box)[:, :2].min(axis=1) == 0.0
         box = box[across | (box[:, 2] == side[8])]
         fixed = box[:, 2] == 0.0
-        film = core.minimal_surface(box, fixed)
+        film = core.deform.minimal_surface(box, fixed)
         assert film.converged
         assert np.abs(film.points[:, 2]).max() < 1e-2
         assert film.areas.sum() == pytest.approx(1.0, rel=1e-2)
@@ -120,7 +120,7 @@ class TestFlat:
         points = square_grid(21)
         inset = np.minimum(points, 1.0 - points)[:, :2].min(axis=1)
         points[:, 2] = 3.0 * np.maximum(inset - 0.1, 0.0) ** 2
-        film = core.minimal_surface(points, inset < 0.1)
+        film = core.deform.minimal_surface(points, inset < 0.1)
         assert film.converged
         assert np.abs(film.points[:, 2]).max() < 1e-3
         assert film.areas.sum() == pytest.approx(1.0, rel=5e-3)
@@ -128,7 +128,7 @@ class TestFlat:
     def test_pinned_part_of_a_closed_surface(self):
         points = fibonacci_sphere(600)
         free = points[:, 2] > 0.6
-        film = core.minimal_surface(points, ~free, max_steps=3)
+        film = core.deform.minimal_surface(points, ~free, max_steps=3)
         np.testing.assert_array_equal(film.points[~free], points[~free])
         # Across a crease the kernel sees both sides: within a spacing, which is 0.1 here.
         assert np.abs(film.points[free, 2] - 0.6).max() < 0.1
@@ -136,13 +136,13 @@ class TestFlat:
     def test_the_boundary_that_was_found(self):
         points = hemisphere_random(500, 2)
         boundary = core.build_laplacian(points).boundary
-        film = core.minimal_surface(points, boundary, max_steps=2)
+        film = core.deform.minimal_surface(points, boundary, max_steps=2)
         assert film.points[:, 2].max() < points[boundary, 2].max() + 1e-2
 
 
 def test_helicoid_between_four_corners():
     points, boundary, area = helicoid(25)
-    film = core.minimal_surface(points, boundary)
+    film = core.deform.minimal_surface(points, boundary)
     assert film.converged
     x, y, z = film.points.T
     assert np.abs(x * np.sin(z) - y * np.cos(z)).max() < 2e-3
@@ -154,7 +154,9 @@ class TestInvariance:
         points, fixed, expected = coarse
         turn = np.linalg.qr(np.random.default_rng(1).standard_normal((3, 3)))[0]
         order = np.random.default_rng(2).permutation(len(points))
-        film = core.minimal_surface((30.0 * points @ turn.T + [5.0, -70.0, 20.0])[order], np.flatnonzero(fixed[order]))
+        film = core.deform.minimal_surface(
+            (30.0 * points @ turn.T + [5.0, -70.0, 20.0])[order], np.flatnonzero(fixed[order])
+        )
         assert film.steps == expected.steps
         moved = 30.0 * expected.points[order] @ turn.T + [5.0, -70.0, 20.0]
         np.testing.assert_allclose(film.points, moved, atol=30.0 * 1e-3)
@@ -162,14 +164,14 @@ class TestInvariance:
 
     def test_the_same_twice(self, coarse):
         points, fixed, expected = coarse
-        np.testing.assert_array_equal(core.minimal_surface(points, fixed).points, expected.points)
+        np.testing.assert_array_equal(core.deform.minimal_surface(points, fixed).points, expected.points)
 
 
 class TestPinching:
     @pytest.mark.parametrize("height", [2.8, 5.0])
     def test_rings_too_far_apart(self, height):
         points, fixed = tube(30, round(3.0 * height), height=height)
-        film = core.minimal_surface(points, fixed)
+        film = core.deform.minimal_surface(points, fixed)
         assert not film.converged
         assert film.reason == "pinching"
         assert any("pinches" in notice for notice in film.notices)
@@ -182,7 +184,7 @@ class TestPinching:
 
     def test_rings_just_near_enough(self):
         points, fixed = tube(60, 16, height=2.6)
-        film = core.minimal_surface(points, fixed)
+        film = core.deform.minimal_surface(points, fixed)
         assert film.converged
         assert abs(catenoid_errors(film.points, film.areas, height=2.6)[1]) < 2e-2
 
@@ -190,14 +192,14 @@ class TestPinching:
 class TestEnding:
     def test_step_limit(self, coarse):
         points, fixed, expected = coarse
-        film = core.minimal_surface(points, fixed, max_steps=1)
+        film = core.deform.minimal_surface(points, fixed, max_steps=1)
         assert (film.steps, film.converged, film.reason) == (1, False, "step limit")
         assert film.area_history[0] == expected.area_history[0]
         assert len(film.notices) == 1
 
     def test_no_steps(self, coarse):
         points, fixed, expected = coarse
-        film = core.minimal_surface(points, fixed, max_steps=0)
+        film = core.deform.minimal_surface(points, fixed, max_steps=0)
         np.testing.assert_array_equal(film.points, points)
         assert film.areas.sum() == film.initial_area == expected.initial_area
         assert len(film.area_history) == 0
@@ -207,9 +209,9 @@ class TestEnding:
         points = random_sphere(1600)
         points = points[np.abs(points[:, 2]) < 0.5]
         fixed = np.abs(points[:, 2]) > 0.36
-        film = core.minimal_surface(points, fixed)
+        film = core.deform.minimal_surface(points, fixed)
         assert (film.converged, film.steps < 9) == (True, True)
-        further = core.minimal_surface(points, fixed, epsilon=0.0, max_steps=film.steps + 2)
+        further = core.deform.minimal_surface(points, fixed, epsilon=0.0, max_steps=film.steps + 2)
         moved = np.linalg.norm(further.points - film.points, axis=1)
         assert np.sqrt(np.mean(moved**2)) < 0.02 * np.sqrt(film.areas.mean())
         assert abs(further.areas.sum() / film.areas.sum() - 1.0) < 5e-4
@@ -228,7 +230,7 @@ class TestEnding:
                 return False
             return None
 
-        film = core.minimal_surface(points, fixed, callback=callback)
+        film = core.deform.minimal_surface(points, fixed, callback=callback)
         assert film.reason == ("cancelled" if raising else "stopped")
         assert not film.converged
         assert [step for step, _, _ in seen] == [1, 2]
@@ -245,7 +247,7 @@ class TestEnding:
             if builds.count(("Areas", 0.5)) == 4:  # of the given points twice, then of each step
                 raise core.Cancelled
 
-        film = core.minimal_surface(points, fixed, progress=progress)
+        film = core.deform.minimal_surface(points, fixed, progress=progress)
         assert (film.steps, film.reason) == (1, "cancelled")
         np.testing.assert_array_equal(film.area_history, expected.area_history[:1])
 
@@ -254,31 +256,31 @@ class TestRefusals:
     @pytest.mark.parametrize("fixed", [[], [0, 1, 2], np.ones(480, dtype=bool)])
     def test_too_few_or_too_many_fixed(self, coarse, fixed):
         with pytest.raises(core.InvalidPointsError, match="points are fixed"):
-            core.minimal_surface(coarse[0], fixed)
+            core.deform.minimal_surface(coarse[0], fixed)
 
     def test_a_free_edge(self, coarse):
         with pytest.raises(core.InvalidPointsError, match="ends at 48 points"):
-            core.minimal_surface(coarse[0], coarse[0][:, 2] == -1.0)
+            core.deform.minimal_surface(coarse[0], coarse[0][:, 2] == -1.0)
 
     def test_a_part_without_fixed_points(self, coarse):
         points, fixed, _ = coarse
         both = np.concatenate([points, fibonacci_sphere(500) + [9.0, 0.0, 0.0]])
         with pytest.raises(core.InvalidPointsError, match="500 of 980 points are in components"):
-            core.minimal_surface(both, np.flatnonzero(fixed))
+            core.deform.minimal_surface(both, np.flatnonzero(fixed))
 
     @pytest.mark.parametrize(
         "settings", [{"epsilon": -1.0}, {"epsilon": np.nan}, {"max_steps": -1}, {"max_steps": 1.5}]
     )
     def test_settings_out_of_range(self, coarse, settings):
         with pytest.raises(core.InvalidPointsError, match="tolerance"):
-            core.minimal_surface(*coarse[:2], **settings)
+            core.deform.minimal_surface(*coarse[:2], **settings)
 
     def test_bad_coordinates(self, coarse):
         points, fixed, _ = coarse
         with pytest.raises(core.InvalidPointsError, match="not finite"):
-            core.minimal_surface(np.where(points > 1.99, np.nan, points), fixed)
+            core.deform.minimal_surface(np.where(points > 1.99, np.nan, points), fixed)
         with pytest.raises(core.InvalidPointsError, match="480 truth values"):
-            core.minimal_surface(points, fixed[:-1])
+            core.deform.minimal_surface(points, fixed[:-1])
 
 
 class TestBoundaryCurve:
@@ -335,5 +337,5 @@ def test_a_step_that_was_not_found_settles_nothing(monkeypatch):
     grid = square_grid(12)
     edge = np.isin(grid[:, :2], [grid.min(), grid[:, :2].max()]).any(axis=1)
     bump = grid + 0.01 * np.where(edge, 0.0, np.sin(3.0 * grid[:, 0]))[:, None] * [0.0, 0.0, 1.0]
-    film = core.minimal_surface(bump, edge, epsilon=1.0, max_steps=2)
+    film = core.deform.minimal_surface(bump, edge, epsilon=1.0, max_steps=2)
     assert (film.converged, film.reason) == (False, "step limit")

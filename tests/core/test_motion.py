@@ -46,7 +46,7 @@ def test_heat_keeps_its_total_on_each_component_and_its_range(step):
     laplacian = patchy()
     before = RNG.random((1002, 2)) - 0.3
     given = before.copy()
-    after = core.Heat(laplacian, step * spacing(laplacian) ** 2).advance(before)
+    after = core.motion.Heat(laplacian, step * spacing(laplacian) ** 2).advance(before)
     np.testing.assert_array_equal(before, given)
     for number in (0, 1):
         own = laplacian.component == number
@@ -58,7 +58,7 @@ def test_heat_keeps_its_total_on_each_component_and_its_range(step):
 
 def test_heat_keeps_its_total_over_a_thousand_steps():
     laplacian = sphere()
-    heat, values = core.Heat(laplacian, 0.3 * spacing(laplacian) ** 2), RNG.random(800)
+    heat, values = core.motion.Heat(laplacian, 0.3 * spacing(laplacian) ** 2), RNG.random(800)
     total = laplacian.areas @ values
     for _ in range(1000):
         values = heat.advance(values)
@@ -68,15 +68,15 @@ def test_heat_keeps_its_total_over_a_thousand_steps():
 
 @pytest.mark.parametrize("step", [1e-3, 0.1, 3.0])
 def test_modes_of_heat_fade_as_their_exponentials(step):
-    after = core.Heat(sphere(), step).advance(modes().eigenvectors)
+    after = core.motion.Heat(sphere(), step).advance(modes().eigenvectors)
     expected = np.exp(-step * modes().eigenvalues) * modes().eigenvectors
     np.testing.assert_allclose(after, expected, atol=1e-10 * np.abs(expected).max())
 
 
 def test_a_long_implicit_step_of_heat_is_near_the_exponential(monkeypatch):
-    exact = core.Heat(sphere(), 0.3).advance(modes().eigenvectors)
+    exact = core.motion.Heat(sphere(), 0.3).advance(modes().eigenvectors)
     monkeypatch.setattr(propagation, "_HEAT", 0.0)
-    after = core.Heat(sphere(), 0.3).advance(modes().eigenvectors)
+    after = core.motion.Heat(sphere(), 0.3).advance(modes().eigenvectors)
     rational = (1.0 + 0.3 / 8 * modes().eigenvalues) ** -8.0
     np.testing.assert_allclose(after, rational * modes().eigenvectors, atol=1e-9)
     np.testing.assert_allclose(after, exact, atol=0.035 * np.abs(modes().eigenvectors).max())
@@ -89,8 +89,8 @@ def test_heat_of_spots_is_found_around_them(spread):
     step = 0.25 * (spread * spacing(laplacian)) ** 2
     spots = np.linalg.norm(laplacian.points[:, None] - laplacian.points[[0, 1700]], axis=2) < 0.1
     before = 3.0 + 5.0 * spots
-    exact = core.Heat(laplacian, step).advance(before)
-    after = core.Heat(laplacian, step, accuracy=1e-6).advance(before)
+    exact = core.motion.Heat(laplacian, step).advance(before)
+    after = core.motion.Heat(laplacian, step, accuracy=1e-6).advance(before)
     assert np.abs(after - exact).max() < 5e-6
     still = after == 3.0
     assert still.any(axis=0).all()
@@ -100,7 +100,7 @@ def test_heat_of_spots_is_found_around_them(spread):
 
 def test_heat_of_functions_that_vary_everywhere_is_found_everywhere():
     values = np.column_stack([RNG.random(800), np.ones(800), sphere().points[:, 0]])
-    exact, after = (core.Heat(sphere(), 0.02, accuracy=share).advance(values) for share in (0.0, 1e-3))
+    exact, after = (core.motion.Heat(sphere(), 0.02, accuracy=share).advance(values) for share in (0.0, 1e-3))
     np.testing.assert_array_equal(after[:, 1], 1.0)
     np.testing.assert_array_equal(after[:, [0, 2]], exact[:, [0, 2]])
 
@@ -108,28 +108,28 @@ def test_heat_of_functions_that_vary_everywhere_is_found_everywhere():
 def test_heat_of_spots_does_not_cross_to_other_components():
     laplacian = patchy()
     before = (laplacian.points[:, 2] > 0.9).astype(float)
-    exact, after = (core.Heat(laplacian, 0.02, accuracy=share).advance(before) for share in (0.0, 1e-6))
+    exact, after = (core.motion.Heat(laplacian, 0.02, accuracy=share).advance(before) for share in (0.0, 1e-6))
     assert np.abs(after - exact).max() < 1e-6
     np.testing.assert_array_equal(after[600:1000], 0.0)
 
 
 def test_many_small_steps_of_heat_are_one_large_one():
     values = RNG.random(800)
-    after, small = values, core.Heat(sphere(), 0.01)
+    after, small = values, core.motion.Heat(sphere(), 0.01)
     for _ in range(20):
         after = small.advance(after)
-    np.testing.assert_allclose(after, core.Heat(sphere(), 0.2).advance(values), rtol=1e-11)
+    np.testing.assert_allclose(after, core.motion.Heat(sphere(), 0.2).advance(values), rtol=1e-11)
 
 
 @pytest.mark.parametrize("step", STEPS)
 def test_waves_keep_their_energy_and_momentum(step):
     laplacian = patchy()
-    wave = core.Wave(laplacian, min(step, 1e7) * spacing(laplacian), 1.3)
+    wave = core.motion.Wave(laplacian, min(step, 1e7) * spacing(laplacian), 1.3)
     known, component = laplacian.component >= 0, laplacian.component
     velocity = RNG.standard_normal(1002)
     means = np.bincount(component[known], laplacian.areas[known] * velocity[known])
     velocity[known] -= (means / np.bincount(component[known], laplacian.areas[known]))[component[known]]
-    before = core.WaveState(RNG.random(1002), velocity)
+    before = core.motion.WaveState(RNG.random(1002), velocity)
     after = wave.advance(before)
     energy = 0.5 * np.sum(laplacian.areas * velocity**2)
     energy += 0.5 * 1.3**2 * before.displacement @ (laplacian.stiffness @ before.displacement)
@@ -144,12 +144,12 @@ def test_waves_keep_their_energy_and_momentum(step):
 
 @pytest.mark.parametrize("step", [0.1, 1e4])
 def test_a_push_moves_all_points_as_far(step):
-    state = core.Wave(sphere(), step).advance(np.stack([np.ones(800), np.full(800, 2.0)], axis=1))
+    state = core.motion.Wave(sphere(), step).advance(np.stack([np.ones(800), np.full(800, 2.0)], axis=1))
     np.testing.assert_allclose(state, np.tile([1.0 + 2.0 * step, 2.0], (800, 1)), rtol=1e-9)
 
 
 def test_waves_keep_their_energy_over_a_thousand_steps():
-    wave = core.Wave(sphere(), spacing(sphere()))
+    wave = core.motion.Wave(sphere(), spacing(sphere()))
     state = np.stack([RNG.random(800), RNG.random(800)], axis=1)
     energy = wave.energy(state)
     for _ in range(1000):
@@ -160,7 +160,7 @@ def test_waves_keep_their_energy_over_a_thousand_steps():
 def test_modes_of_waves_swing_with_the_root_of_their_eigenvalues():
     mode, step, speed = modes().eigenvectors[:, 5], 0.7, 2.5
     turn = speed * np.sqrt(modes().eigenvalues[5])
-    after = core.Wave(sphere(), step, speed).advance((mode, 3.0 * mode))
+    after = core.motion.Wave(sphere(), step, speed).advance((mode, 3.0 * mode))
     factor = np.cos(turn * step) + 3.0 * np.sin(turn * step) / turn
     np.testing.assert_allclose(after.displacement, factor * mode, atol=1e-10)
     factor = 3.0 * np.cos(turn * step) - turn * np.sin(turn * step)
@@ -169,8 +169,8 @@ def test_modes_of_waves_swing_with_the_root_of_their_eigenvalues():
 
 def test_a_long_implicit_step_of_a_wave_is_the_trapezoidal_rule(monkeypatch):
     monkeypatch.setattr(propagation, "_WAVE", 0.0)
-    before = core.WaveState(RNG.random(800), RNG.random(800))
-    after = core.Wave(sphere(), 0.2, 1.5).advance(before)
+    before = core.motion.WaveState(RNG.random(800), RNG.random(800))
+    after = core.motion.Wave(sphere(), 0.2, 1.5).advance(before)
     u, v = (0.5 * (now + then) for now, then in zip(after, before, strict=True))
     np.testing.assert_allclose(after.displacement - before.displacement, 0.2 * v, atol=1e-12)
     change = 0.2 * 1.5**2 * sphere().apply(u, raw=True)
@@ -182,8 +182,8 @@ def test_a_plane_wave_runs_around_a_strip_at_its_speed():
     laplacian = core.build_laplacian(points)
     angle, waves, speed, step = np.arctan2(points[:, 1], points[:, 0]), 5, 3.0, 0.05
     turn = speed * waves / 2.0
-    wave = core.Wave(laplacian, step, speed)
-    state = core.WaveState(np.cos(waves * angle), turn * np.sin(waves * angle))
+    wave = core.motion.Wave(laplacian, step, speed)
+    state = core.motion.WaveState(np.cos(waves * angle), turn * np.sin(waves * angle))
     for _ in range(20):
         state = wave.advance(state)
     run = np.angle(laplacian.areas @ (state.displacement * np.exp(1j * waves * angle)))
@@ -197,8 +197,8 @@ def test_a_standing_wave_swings_between_the_ends_of_a_strip_at_its_speed(count):
     laplacian = core.build_laplacian(points)
     number = np.pi * 4 / 3.0
     profile = np.cos(number * points[:, 0])
-    state = core.WaveState(profile, np.zeros(len(points)))
-    state = core.Wave(laplacian, 0.25 * np.pi / number, 2.0).advance(state)  # an eighth of a turn, twice
+    state = core.motion.WaveState(profile, np.zeros(len(points)))
+    state = core.motion.Wave(laplacian, 0.25 * np.pi / number, 2.0).advance(state)  # an eighth of a turn, twice
     weights = laplacian.areas * profile
     place, velocity = weights @ state.displacement, weights @ state.velocity
     phase = np.arctan2(-velocity / (2.0 * number), place)
@@ -210,7 +210,7 @@ def test_waves_on_a_torus_have_the_frequencies_of_its_modes(operators):
     pairs = laplacian.eigenpairs(12)
     for mode, exact in zip(pairs.eigenvectors.T[1:], torus_eigenvalues(12)[1:], strict=True):
         step = 0.25 * np.pi / np.sqrt(exact)
-        state = core.Wave(laplacian, step).advance((mode, 0.0 * mode))
+        state = core.motion.Wave(laplacian, step).advance((mode, 0.0 * mode))
         weights = laplacian.areas * mode
         phase = np.arctan2(-(weights @ state.velocity) / np.sqrt(exact), weights @ state.displacement)
         assert phase == pytest.approx(0.25 * np.pi, rel=0.01)
@@ -232,7 +232,7 @@ def reaction_of(state, time, feed=0.04, kill=0.06):
 @pytest.mark.parametrize(("step", "exact"), [(0.5, 1e-6), (5.0, 1e-3), (200.0, 2e-3)])
 @pytest.mark.parametrize("state", [(1.0, 0.3), (0.5, 0.25), (0.0, 1.0), (3.0, 4.0)])
 def test_where_all_points_are_alike_only_the_reaction_is_left(state, step, exact):
-    reaction = core.ReactionDiffusion(sphere(), step, *MIXED)
+    reaction = core.motion.ReactionDiffusion(sphere(), step, *MIXED)
     after = reaction.advance([np.full(800, value) for value in state])
     assert np.ptp(after.food) < 1e-12
     np.testing.assert_allclose([after.food[0], after.eater[0]], reaction_of(state, step), atol=exact)
@@ -242,14 +242,14 @@ def test_where_all_points_are_alike_only_the_reaction_is_left(state, step, exact
 def test_concentrations_stay_between_zero_and_one_at_any_step(step):
     food, eater = RNG.random(800), np.zeros(800)
     eater[300:400] = 1.0 - food[300:400]
-    state = core.ReactionDiffusion(sphere(), step, *MIXED).advance((food, eater))
+    state = core.motion.ReactionDiffusion(sphere(), step, *MIXED).advance((food, eater))
     assert min(state.food.min(), state.eater.min()) >= 0.0
     assert max(state.food.max(), state.eater.max()) <= 1.0
 
 
 def test_without_feed_and_kill_the_sum_of_both_substances_stays():
     state = RNG.random((800, 2))
-    reaction = core.ReactionDiffusion(sphere(), 2.0, 0.0, 0.0, MIXED[2])
+    reaction = core.motion.ReactionDiffusion(sphere(), 2.0, 0.0, 0.0, MIXED[2])
     after = reaction.advance(state)
     assert after.shape == (800, 2)
     areas = sphere().areas
@@ -261,7 +261,7 @@ def test_steps_of_reaction_and_diffusion_are_of_second_order():
     food = 1.0 - 0.5 * np.exp(-20.0 * (1.0 - sphere().points[:, 2]))
 
     def error(steps):
-        reaction, state = core.ReactionDiffusion(sphere(), 16.0 / steps, *MIXED), (food, 1.0 - food)
+        reaction, state = core.motion.ReactionDiffusion(sphere(), 16.0 / steps, *MIXED), (food, 1.0 - food)
         for _ in range(steps):
             state = reaction.advance(state)
         return state.food
@@ -275,7 +275,7 @@ def test_steps_of_reaction_and_diffusion_are_of_second_order():
 def test_modes_of_waves_solve_their_equation(damping):
     pairs, areas = modes(), sphere().areas
     place, velocity = RNG.standard_normal(9), RNG.standard_normal(9)
-    wave = core.wave_modes(
+    wave = core.motion.wave_modes(
         pairs, areas, pairs.eigenvectors @ place, pairs.eigenvectors @ velocity, speed=1.2, damping=damping
     )
     stiff = 1.2**2 * pairs.eigenvalues
@@ -295,24 +295,24 @@ def test_a_mode_that_is_critically_damped_fades_without_a_swing():
     frequency = float(np.sqrt(modes().eigenvalues[4]))
     mode, areas = modes().eigenvectors[:, 4], sphere().areas
     for damping in frequency * (1.0 + np.array([-1e-9, 0.0, 1e-9])):
-        wave = core.wave_modes(modes(), areas, mode, 0.0, damping=damping)
+        wave = core.motion.wave_modes(modes(), areas, mode, 0.0, damping=damping)
         expected = (1.0 + frequency * 1.5) * np.exp(-frequency * 1.5)
         assert areas @ (wave(1.5) * mode) == pytest.approx(expected, rel=1e-7)
 
 
 def test_modes_of_waves_are_steps_of_waves():
-    state = core.WaveState(*(modes().eigenvectors @ RNG.standard_normal((9, 2))).T)
-    at = core.wave_modes(modes(), sphere().areas, *state, speed=0.8)
-    wave = core.Wave(sphere(), 0.4, 0.8)
+    state = core.motion.WaveState(*(modes().eigenvectors @ RNG.standard_normal((9, 2))).T)
+    at = core.motion.wave_modes(modes(), sphere().areas, *state, speed=0.8)
+    wave = core.motion.Wave(sphere(), 0.4, 0.8)
     for number in range(1, 4):
         state = wave.advance(state)
         np.testing.assert_allclose(at(0.4 * number), state.displacement, atol=1e-9)
 
 
 def test_a_push_moves_all_on_and_damping_stops_it():
-    free = core.wave_modes(modes(), sphere().areas, 0.0, 2.0)
+    free = core.motion.wave_modes(modes(), sphere().areas, 0.0, 2.0)
     np.testing.assert_allclose(free(3.0), 6.0, rtol=1e-6)
-    slowed = core.wave_modes(modes(), sphere().areas, 0.0, 2.0, damping=0.25)
+    slowed = core.motion.wave_modes(modes(), sphere().areas, 0.0, 2.0, damping=0.25)
     np.testing.assert_allclose(slowed(1e3), 2.0 / (2.0 * 0.25), rtol=1e-6)
 
 
@@ -323,19 +323,21 @@ def test_motion_is_the_same_in_any_unit_place_and_order(unit):
     moved = core.build_laplacian(unit * (sphere().points @ turn + [1.0, 2.0, 3.0])[order])
     values, velocity = RNG.random((2, 800))
     exact = {"rtol": 1e-6, "atol": 1e-6}  # as closely as the operators agree
-    heat = core.Heat(moved, unit**2 * 0.02).advance(values[order])
-    np.testing.assert_allclose(heat, core.Heat(sphere(), 0.02).advance(values)[order], **exact)
-    wave = core.Wave(moved, 0.1, unit).advance((values[order], velocity[order]))
-    np.testing.assert_allclose(wave, np.array(core.Wave(sphere(), 0.1).advance((values, velocity)))[:, order], **exact)
+    heat = core.motion.Heat(moved, unit**2 * 0.02).advance(values[order])
+    np.testing.assert_allclose(heat, core.motion.Heat(sphere(), 0.02).advance(values)[order], **exact)
+    wave = core.motion.Wave(moved, 0.1, unit).advance((values[order], velocity[order]))
+    np.testing.assert_allclose(
+        wave, np.array(core.motion.Wave(sphere(), 0.1).advance((values, velocity)))[:, order], **exact
+    )
     rates = unit**2 * np.array(MIXED[2])
-    mixed = core.ReactionDiffusion(moved, 1.0, *MIXED[:2], rates).advance((values[order], velocity[order]))
-    expected = core.ReactionDiffusion(sphere(), 1.0, *MIXED).advance((values, velocity))
+    mixed = core.motion.ReactionDiffusion(moved, 1.0, *MIXED[:2], rates).advance((values[order], velocity[order]))
+    expected = core.motion.ReactionDiffusion(sphere(), 1.0, *MIXED).advance((values, velocity))
     np.testing.assert_allclose(mixed, np.array(expected)[:, order], **exact)
 
 
 def test_progress_is_told_and_can_cancel():
     stages = []
-    heat = core.Heat(sphere(), 0.1, progress=lambda *told: stages.append(told))
+    heat = core.motion.Heat(sphere(), 0.1, progress=lambda *told: stages.append(told))
     heat.advance(np.ones(800), progress=lambda *told: stages.append(told))
     assert {stage for stage, _ in stages} == {"Equations", "Step"}
     assert all(0.0 <= fraction <= 1.0 for _, fraction in stages)
@@ -344,7 +346,7 @@ def test_progress_is_told_and_can_cancel():
         raise core.Cancelled
 
     for work in (
-        lambda: core.Wave(sphere(), 0.1, progress=cancel),
+        lambda: core.motion.Wave(sphere(), 0.1, progress=cancel),
         lambda: heat.advance(np.ones(800), progress=cancel),
     ):
         with pytest.raises(core.Cancelled):
@@ -357,30 +359,36 @@ NOTHING = np.zeros(800)
 @pytest.mark.parametrize(
     ("call", "text"),
     [
-        (lambda on: core.Heat(on, 0.0), "step is 0.0. Use a number above zero"),
-        (lambda on: core.Heat(on, np.nan), "step is nan"),
-        (lambda on: core.Heat(on, True), "step is True"),
-        (lambda on: core.Heat(on, 1.0, accuracy=-1.0), "accuracy is -1.0"),
-        (lambda on: core.Heat(on, 1.0).advance(np.zeros(3)), r"shape \(3,\).*one row of real numbers for each of 800"),
-        (lambda on: core.Heat(on, 1.0).advance(NOTHING + np.inf), "800 of 800 values are not finite"),
-        (lambda on: core.Wave(on, -1.0), "step is -1.0"),
-        (lambda on: core.Wave(on, 1.0, 0.0), "speed is 0.0"),
-        (lambda on: core.Wave(on, 1.0).advance(NOTHING), "no pair: .*Give two functions of 800 numbers"),
-        (lambda on: core.Wave(on, 1.0).advance((NOTHING, NOTHING[:5])), r"shape \(5,\)"),
-        (lambda on: core.Wave(on, 1.0).advance(0.0), "no pair"),
-        (lambda on: core.ReactionDiffusion(on, 0.0, *MIXED), "step is 0.0"),
-        (lambda on: core.ReactionDiffusion(on, 1.0, -0.1, 0.0, (1.0, 1.0)), "feed is -0.1. Use a number that is not"),
-        (lambda on: core.ReactionDiffusion(on, 1.0, 0.1, "x", (1.0, 1.0)), "kill is 'x'"),
-        (lambda on: core.ReactionDiffusion(on, 1.0, 0.1, 0.1, 1.0), "rates are 1.0. Give two"),
-        (lambda on: core.ReactionDiffusion(on, 1.0, 0.1, 0.1, (1.0, np.inf)), "rate is inf"),
+        (lambda on: core.motion.Heat(on, 0.0), "step is 0.0. Use a number above zero"),
+        (lambda on: core.motion.Heat(on, np.nan), "step is nan"),
+        (lambda on: core.motion.Heat(on, True), "step is True"),
+        (lambda on: core.motion.Heat(on, 1.0, accuracy=-1.0), "accuracy is -1.0"),
         (
-            lambda on: core.ReactionDiffusion(on, 1.0, *MIXED).advance((NOTHING - 1.0, NOTHING)),
+            lambda on: core.motion.Heat(on, 1.0).advance(np.zeros(3)),
+            r"shape \(3,\).*one row of real numbers for each of 800",
+        ),
+        (lambda on: core.motion.Heat(on, 1.0).advance(NOTHING + np.inf), "800 of 800 values are not finite"),
+        (lambda on: core.motion.Wave(on, -1.0), "step is -1.0"),
+        (lambda on: core.motion.Wave(on, 1.0, 0.0), "speed is 0.0"),
+        (lambda on: core.motion.Wave(on, 1.0).advance(NOTHING), "no pair: .*Give two functions of 800 numbers"),
+        (lambda on: core.motion.Wave(on, 1.0).advance((NOTHING, NOTHING[:5])), r"shape \(5,\)"),
+        (lambda on: core.motion.Wave(on, 1.0).advance(0.0), "no pair"),
+        (lambda on: core.motion.ReactionDiffusion(on, 0.0, *MIXED), "step is 0.0"),
+        (
+            lambda on: core.motion.ReactionDiffusion(on, 1.0, -0.1, 0.0, (1.0, 1.0)),
+            "feed is -0.1. Use a number that is not",
+        ),
+        (lambda on: core.motion.ReactionDiffusion(on, 1.0, 0.1, "x", (1.0, 1.0)), "kill is 'x'"),
+        (lambda on: core.motion.ReactionDiffusion(on, 1.0, 0.1, 0.1, 1.0), "rates are 1.0. Give two"),
+        (lambda on: core.motion.ReactionDiffusion(on, 1.0, 0.1, 0.1, (1.0, np.inf)), "rate is inf"),
+        (
+            lambda on: core.motion.ReactionDiffusion(on, 1.0, *MIXED).advance((NOTHING - 1.0, NOTHING)),
             "800 of 800 points have negative concentrations",
         ),
-        (lambda on: core.wave_modes(modes(), on.areas, NOTHING, NOTHING, speed=0.0), "speed is 0.0"),
-        (lambda on: core.wave_modes(modes(), on.areas, NOTHING, 0.0, damping=-1.0), "damping is -1.0"),
-        (lambda on: core.wave_modes(modes(), on.areas[:3], NOTHING, 0.0), r"shape \(3,\)"),
-        (lambda on: core.wave_modes(modes(), on.areas, NOTHING, 0.0)(np.nan), "times are not finite"),
+        (lambda on: core.motion.wave_modes(modes(), on.areas, NOTHING, NOTHING, speed=0.0), "speed is 0.0"),
+        (lambda on: core.motion.wave_modes(modes(), on.areas, NOTHING, 0.0, damping=-1.0), "damping is -1.0"),
+        (lambda on: core.motion.wave_modes(modes(), on.areas[:3], NOTHING, 0.0), r"shape \(3,\)"),
+        (lambda on: core.motion.wave_modes(modes(), on.areas, NOTHING, 0.0)(np.nan), "times are not finite"),
     ],
 )
 def test_errors_say_what_is_wrong(call, text):
@@ -393,8 +401,8 @@ def test_patterns_have_the_size_that_was_asked_for(pattern):
     """The mean of the squared wavenumber, by Rayleigh's quotient, is near that of the pattern."""
     laplacian, size = sphere(), 1.4
     near = laplacian.points @ laplacian.points[400] > np.cos(0.4 * size)
-    reaction = core.ReactionDiffusion.of_pattern(laplacian, 5.0, pattern, size)
-    state = core.Mixture(1.0 - near, 1.0 * near)
+    reaction = core.motion.ReactionDiffusion.of_pattern(laplacian, 5.0, pattern, size)
+    state = core.motion.Mixture(1.0 - near, 1.0 * near)
     for _ in range(500):
         state = reaction.advance(state)
     ripple = state.eater - laplacian.areas @ state.eater / laplacian.areas.sum()
@@ -405,4 +413,4 @@ def test_patterns_have_the_size_that_was_asked_for(pattern):
 
 def test_an_unknown_pattern_is_refused():
     with pytest.raises(core.PointCloudError, match="pattern is 'dots'. Choose one of 'spots', 'stripes'"):
-        core.ReactionDiffusion.of_pattern(sphere(), 1.0, "dots", 1.0)
+        core.motion.ReactionDiffusion.of_pattern(sphere(), 1.0, "dots", 1.0)

@@ -27,7 +27,7 @@ def named():
 
 
 def test_all_take_both():
-    found = [(call.__name__, each) for call, each in named() if call is not core.profile]  # whose path are points
+    found = [(call.__name__, each) for call, each in named()]
     assert len(found) > 20
     wrong = {name for name, each in found if each.annotation not in (FilePath, "FilePath", Sequence[FilePath])}
     assert wrong == set()
@@ -36,7 +36,7 @@ def test_all_take_both():
 def splats_of(points):
     one = np.ones(len(points))
     rotations = np.tile([1.0, 0.0, 0.0, 0.0], (len(points), 1))
-    return core.Splats(
+    return core.splats.Splats(
         points, points**2 + 0.1, rotations, 0.5 * one, np.zeros((len(points), 3)), np.zeros((len(points), 0, 3))
     )
 
@@ -59,8 +59,8 @@ CALLS = {
     "check_places": lambda path: files.check_places(SAMPLE, path("a.ply")),
     "frame_number": lambda path: files.frame_number(path("scan_012.ply")),
     "order_frames": lambda path: [one.name for one in files.order_frames([path("s_2.ply"), path("s_1.ply")])],
-    "write_splats": lambda path: core.write_splats(path("s.ply"), splats_of(SAMPLE)),
-    "read_splats": lambda path: len(core.read_splats(path("s.ply"))),
+    "write_splats": lambda path: core.splats.write_splats(path("s.ply"), splats_of(SAMPLE)),
+    "read_splats": lambda path: len(core.splats.read_splats(path("s.ply"))),
     "read_file": lambda path: len(splats.read_file(path("s.ply"))),
     "tile_folder": lambda path: tiles.tile_folder(path("store"), 3),
     "cut_to_store": lambda path: tiles.cut_to_store(lambda: [(SAMPLE, {})], path("store"), 20).count,
@@ -79,7 +79,7 @@ def test_texts_and_paths_are_the_same(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "call", [files.read_points, files.has_levels, core.read_splats, tiles.Store], ids=lambda one: one.__name__
+    "call", [files.read_points, files.has_levels, core.splats.read_splats, tiles.Store], ids=lambda one: one.__name__
 )
 @pytest.mark.parametrize("wrong", [None, 7, ["a.ply"]], ids=str)
 def test_what_is_no_name(call, wrong):

@@ -80,7 +80,7 @@ def test_terrain_faces_up(sheet, over):
     normals = core.estimate_normals(points)
     signs = np.random.default_rng(1).choice([-1.0, 1.0], (len(points), 1))
     assert np.all(normals[:, 2] > 0.0)
-    assert np.all(core.surface_discs(points).normals[:, 2] > 0.0)
+    assert np.all(core.surface.surface_discs(points).normals[:, 2] > 0.0)
     for method in ("outside", "winding"):
         assert np.all(core.orient_normals(points, signs * normals, method=method)[:, 2] > 0.0), method
 
@@ -91,7 +91,7 @@ def test_terrain_with_what_overhangs_faces_up():
     ball = 0.03 * random_sphere(100) + [0.0, 0.0, 0.03]
     places = [[0.2, 0.3, 0.0], [0.7, 0.6, 0.0], [0.4, 0.8, 0.0]]
     ground = np.column_stack([u, v, 0.05 * np.sin(6.0 * u)])
-    normals = core.surface_discs(np.concatenate([ground, *(ball + place for place in places)])).normals
+    normals = core.surface.surface_discs(np.concatenate([ground, *(ball + place for place in places)])).normals
     assert np.mean(normals[: len(ground), 2] > 0.0) > 0.98
 
 

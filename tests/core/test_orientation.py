@@ -221,9 +221,11 @@ def test_operator_takes_the_side_and_nothing_else_changes():
     np.testing.assert_array_equal(turned.normals[~upper], laplacian.normals[~upper])
     assert np.shares_memory(turned.stiffness.data, laplacian.stiffness.data)
     np.testing.assert_allclose(
-        core.mean_curvature(turned), np.where(upper, -1.0, 1.0) * core.mean_curvature(laplacian), atol=1e-12
+        core.measure.mean_curvature(turned),
+        np.where(upper, -1.0, 1.0) * core.measure.mean_curvature(laplacian),
+        atol=1e-12,
     )
-    before, after = core.principal_curvatures(laplacian), core.principal_curvatures(turned)
+    before, after = core.measure.principal_curvatures(laplacian), core.measure.principal_curvatures(turned)
     np.testing.assert_allclose(after.first[upper], -before.second[upper], atol=1e-9)
 
 

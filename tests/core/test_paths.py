@@ -7,7 +7,7 @@ from benchmarks.samplings import fibonacci_sphere, square_random, torus_points
 
 
 def length(laplacian, start, end):
-    return core.polygon_length(core.geodesic_path(laplacian, start, end))
+    return core.distance.polygon_length(core.distance.geodesic_path(laplacian, start, end))
 
 
 def test_on_the_sphere_paths_are_great_circles(operators):
@@ -17,8 +17,8 @@ def test_on_the_sphere_paths_are_great_circles(operators):
     pairs += [(start, int((points @ points[start]).argmin())) for start in (5, 77)]  # nearly antipodal
     for start, end in pairs:
         exact = np.arctan2(np.linalg.norm(np.cross(points[start], points[end])), points[start] @ points[end])
-        path = core.geodesic_path(laplacian, start, end)
-        assert core.polygon_length(path) == pytest.approx(exact, rel=1e-3)
+        path = core.distance.geodesic_path(laplacian, start, end)
+        assert core.distance.polygon_length(path) == pytest.approx(exact, rel=1e-3)
         np.testing.assert_array_equal(path[[0, -1]], points[[start, end]])
         assert np.abs(np.linalg.norm(path, axis=1) - 1.0).max() < 1e-3
 
@@ -66,22 +66,22 @@ def test_it_leads_around_a_hole():
     points = points[np.hypot(*points[:, :2].T) > 0.2]
     ends = [[-0.4, 0.0, 0.0], [0.4, 0.0, 0.0]]
     laplacian = core.build_laplacian(np.concatenate([ends, points]))
-    path = core.geodesic_path(laplacian, 0, 1)
+    path = core.distance.geodesic_path(laplacian, 0, 1)
     exact = 2.0 * np.sqrt(0.4**2 - 0.2**2) + 0.2 * (np.pi - 2.0 * np.arccos(0.5))
-    assert core.polygon_length(path) == pytest.approx(exact, rel=0.02)
+    assert core.distance.polygon_length(path) == pytest.approx(exact, rel=0.02)
     assert np.hypot(*path[:, :2].T).min() > 0.18
 
 
 def test_it_follows_the_scale_and_translation():
     points = core.example_sphere()
-    before = core.geodesic_path(core.build_laplacian(points), 3, 500)
-    after = core.geodesic_path(core.build_laplacian(5.0 * points + 7.0), 3, 500)
+    before = core.distance.geodesic_path(core.build_laplacian(points), 3, 500)
+    after = core.distance.geodesic_path(core.build_laplacian(5.0 * points + 7.0), 3, 500)
     np.testing.assert_allclose(after, 5.0 * before + 7.0, atol=1e-4)
 
 
 def test_a_point_to_itself_is_no_way():
     laplacian = core.build_laplacian(core.example_sphere())
-    assert core.geodesic_path(laplacian, 4, 4).shape == (2, 3)
+    assert core.distance.geodesic_path(laplacian, 4, 4).shape == (2, 3)
     assert length(laplacian, 4, 4) == 0.0
 
 
@@ -89,9 +89,9 @@ def test_ends_on_two_components_or_none_are_refused():
     points = np.concatenate([fibonacci_sphere(300), fibonacci_sphere(300) + [4.0, 0.0, 0.0], [[2.0, 0.0, 9.0]]])
     laplacian = core.build_laplacian(points)
     with pytest.raises(core.ComponentError, match="0 and 400 lie on two components"):
-        core.geodesic_path(laplacian, 0, 400)
+        core.distance.geodesic_path(laplacian, 0, 400)
     with pytest.raises(core.InvalidPointsError, match="1 of the 2 ends"):
-        core.geodesic_path(laplacian, 0, 600)
+        core.distance.geodesic_path(laplacian, 0, 600)
     for wrong in (-1, 601, 1.5, None):
         with pytest.raises(core.InvalidPointsError, match="whole numbers from 0 to 600"):
-            core.geodesic_path(laplacian, 0, wrong)
+            core.distance.geodesic_path(laplacian, 0, wrong)

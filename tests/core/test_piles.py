@@ -7,7 +7,7 @@ import core
 @pytest.mark.parametrize("height", [-0.3, 0.0, 0.5])
 def test_the_volume_of_a_cap_above_its_rim(operators, height):
     laplacian = operators("random sphere")
-    found = core.pile_volume(laplacian, laplacian.points[:, 2] > height)
+    found = core.measure.pile_volume(laplacian, laplacian.points[:, 2] > height)
     rise = 1.0 - height
     volume = np.pi * rise**2 * (3.0 - rise) / 3.0
     assert found.above == pytest.approx(volume, rel=0.03)
@@ -21,7 +21,7 @@ def test_a_wave_has_as_much_above_the_plane_of_its_rim_as_below():
     inside = (np.abs(u - 0.5) < 0.5) & (np.abs(v - 0.5) < 0.5)
     ends = np.where(inside, np.sin(np.pi * u) ** 2 * np.sin(np.pi * v) ** 2, 0.0)
     points = np.column_stack([u.ravel(), v.ravel(), (0.1 * np.sin(2.0 * np.pi * u) * ends).ravel()])
-    found = core.pile_volume(core.build_laplacian(points), inside.ravel())
+    found = core.measure.pile_volume(core.build_laplacian(points), inside.ravel())
     np.testing.assert_allclose([found.above, found.below], 0.025 / np.pi, rtol=0.03)
 
 
@@ -29,8 +29,8 @@ def test_piles_turn_and_scale(operators):
     laplacian = operators("even sphere")
     turn = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
     chosen = laplacian.points[:, 0] > 0.2
-    one = core.pile_volume(laplacian, chosen)
-    other = core.pile_volume(core.build_laplacian(2.0 * laplacian.points @ turn.T), chosen)
+    one = core.measure.pile_volume(laplacian, chosen)
+    other = core.measure.pile_volume(core.build_laplacian(2.0 * laplacian.points @ turn.T), chosen)
     assert other.above == pytest.approx(8.0 * one.above, rel=1e-4)
     assert other.uncertainty == pytest.approx(8.0 * one.uncertainty, rel=1e-4)
 
@@ -38,7 +38,7 @@ def test_piles_turn_and_scale(operators):
 def test_what_ends_nowhere_has_no_rim(operators):
     laplacian = operators("even sphere")
     with pytest.raises(core.InvalidPointsError, match="The part of 2500 points has 0 points at its rim"):
-        core.pile_volume(laplacian, np.ones(2500, dtype=bool))
+        core.measure.pile_volume(laplacian, np.ones(2500, dtype=bool))
 
 
 @pytest.mark.parametrize("place", [-1.0, 0.5, 0.8])
@@ -46,7 +46,9 @@ def test_a_plane_that_is_chosen_has_a_sign(operators, place):
     """The cap above 0.5, against planes below it, through its rim and within it."""
     laplacian = operators("random sphere")
     cap = laplacian.points[:, 2] > 0.5
-    up, down = (core.pile_volume(laplacian, cap, plane=([3.0, 1.0, place], [0.0, 0.0, 2.0 * sign])) for sign in (1, -1))
+    up, down = (
+        core.measure.pile_volume(laplacian, cap, plane=([3.0, 1.0, place], [0.0, 0.0, 2.0 * sign])) for sign in (1, -1)
+    )
     # By the integral of pi (1 - z^2) over heights, of the whole base below the rim.
     low = max(place, 0.5)
     above = np.pi * (2.0 / 3.0 - low + low**3 / 3.0) + 0.75 * np.pi * (low - place)
@@ -60,9 +62,9 @@ def test_what_is_measured_against_a_plane_follows_rotation_and_scale(operators):
     laplacian = operators("even sphere")
     turn = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
     chosen, place, across = laplacian.points[:, 0] > 0.2, np.array([0.1, 0.0, -0.3]), np.array([0.3, 0.1, 1.0])
-    one = core.pile_volume(laplacian, chosen, plane=(place, across))
+    one = core.measure.pile_volume(laplacian, chosen, plane=(place, across))
     moved = core.build_laplacian(2.0 * laplacian.points @ turn.T)
-    other = core.pile_volume(moved, chosen, plane=(2.0 * turn @ place, turn @ across))
+    other = core.measure.pile_volume(moved, chosen, plane=(2.0 * turn @ place, turn @ across))
     assert [other.above, other.below] == pytest.approx([8.0 * one.above, 8.0 * one.below], rel=1e-4)
     assert other.uncertainty == pytest.approx(8.0 * one.uncertainty, rel=1e-3)
 
@@ -79,7 +81,7 @@ def test_what_is_measured_against_a_plane_follows_rotation_and_scale(operators):
 )
 def test_what_is_no_plane_or_no_part_is_refused(operators, members, plane, text):
     with pytest.raises(core.InvalidPointsError, match=text):
-        core.pile_volume(operators("even sphere"), np.array(members, dtype=int), plane=plane)
+        core.measure.pile_volume(operators("even sphere"), np.array(members, dtype=int), plane=plane)
 
 
 def heap(count, half=1.6, seed=2):
@@ -99,7 +101,7 @@ class TestMissingPieces:
         quadrant = (points[:, :2] > 0.0).all(axis=1)
         for missing in quadrant & (far < 1.0), quadrant:
             laplacian = core.build_laplacian(scale * points[~missing])
-            found = core.pile_volume(laplacian, far[~missing] < 1.05, plane=plane)
+            found = core.measure.pile_volume(laplacian, far[~missing] < 1.05, plane=plane)
             known = abs(found.above - found.below - scale**3 * np.pi / 6.0) < found.uncertainty
             told = [notice.startswith("The surface ends within the part along ") for notice in found.notices]
             assert told == [True] or (known and count < 2000)
@@ -110,7 +112,7 @@ class TestMissingPieces:
         points = heap(count)
         far = np.hypot(*points[:, :2].T)
         for kept in far < 9.0, far < 1.0:
-            found = core.pile_volume(core.build_laplacian(points[kept]), far[kept] < 1.05, plane=plane)
+            found = core.measure.pile_volume(core.build_laplacian(points[kept]), far[kept] < 1.05, plane=plane)
             assert found.notices == []
             assert found.above - found.below == pytest.approx(np.pi / 6.0, rel=0.02, abs=found.uncertainty)
 
@@ -121,7 +123,7 @@ class TestHeights:
     def over(self, points, ground):
         laplacian = core.build_laplacian(points)
         normals = np.tile(self.up[1], (len(points), 1))
-        found = core.surface_deviation(laplacian.surface_points, normals, core.build_laplacian(ground))
+        found = core.measure.surface_deviation(core.build_laplacian(ground), laplacian.surface_points, normals)
         return laplacian, np.where(found.known, found.distance, np.nan)
 
     def test_fill_and_cut_between_two_surveys(self):
@@ -131,11 +133,11 @@ class TestHeights:
             high = np.maximum(0.5 * (1.0 - np.hypot(points[:, 0] - x, points[:, 1])), 0.0)
             points[:, 2] = sign * high + 0.2 * points[:, 0] + 0.1 * points[:, 1]
         laplacian, heights = self.over(after, before)
-        found = core.pile_volume(laplacian, np.ones(6000, dtype=bool), plane=self.up, heights=heights)
+        found = core.measure.pile_volume(laplacian, np.ones(6000, dtype=bool), plane=self.up, heights=heights)
         assert found.above == pytest.approx(np.pi / 3.0, rel=0.03)
         assert found.below < 0.01
         laplacian, heights = self.over(before, after)
-        found = core.pile_volume(laplacian, np.ones(6000, dtype=bool), plane=self.up, heights=heights)
+        found = core.measure.pile_volume(laplacian, np.ones(6000, dtype=bool), plane=self.up, heights=heights)
         assert found.below == pytest.approx(np.pi / 3.0, rel=0.03)
         assert found.above < 0.01
 
@@ -143,23 +145,23 @@ class TestHeights:
         points = heap(3000)
         laplacian, heights = self.over(points, heap(3000, 2.0, 9) * [1.0, 1.0, 0.0])
         within = np.hypot(*points[:, :2].T) < 1.2
-        one = core.pile_volume(laplacian, within, plane=self.up)
-        other = core.pile_volume(laplacian, within, plane=self.up, heights=heights)
+        one = core.measure.pile_volume(laplacian, within, plane=self.up)
+        other = core.measure.pile_volume(laplacian, within, plane=self.up, heights=heights)
         assert [other.above, other.below] == pytest.approx([one.above, one.below], abs=1e-6)
 
     def test_what_has_nothing_below_is_told(self):
         points = heap(3000)
         laplacian, heights = self.over(points, (heap(3000, 2.0, 9) + [2.0, 0.0, 0.0]) * [1.0, 1.0, 0.0])
-        found = core.pile_volume(laplacian, np.ones(3000, dtype=bool), plane=self.up, heights=heights)
+        found = core.measure.pile_volume(laplacian, np.ones(3000, dtype=bool), plane=self.up, heights=heights)
         assert found.above == pytest.approx(np.pi / 12.0, rel=0.05)
         assert any("have nothing of the other surface above or below" in notice for notice in found.notices)
         with pytest.raises(core.InvalidPointsError, match="None of the 3000 points"):
-            core.pile_volume(laplacian, np.ones(3000, dtype=bool), plane=self.up, heights=np.full(3000, np.nan))
+            core.measure.pile_volume(laplacian, np.ones(3000, dtype=bool), plane=self.up, heights=np.full(3000, np.nan))
 
     def test_heights_that_cannot_be_used_are_refused(self, operators):
         laplacian = operators("even sphere")
         cap = laplacian.points[:, 2] > 0.5
         with pytest.raises(core.InvalidPointsError, match="no plane whose normal they are along"):
-            core.pile_volume(laplacian, cap, heights=np.zeros(2500))
+            core.measure.pile_volume(laplacian, cap, heights=np.zeros(2500))
         with pytest.raises(core.InvalidPointsError, match="one real number for each of 2500 points"):
-            core.pile_volume(laplacian, cap, plane=self.up, heights=np.zeros(3))
+            core.measure.pile_volume(laplacian, cap, plane=self.up, heights=np.zeros(3))

@@ -83,7 +83,7 @@ def abrupt_change():
 def test_an_abrupt_change_of_spacing_is_no_component():
     laplacian = core.build_laplacian(abrupt_change())
     assert laplacian.areas.sum() == pytest.approx(10.0, rel=0.2)
-    assert core.check_stability(laplacian).components == laplacian.component.max() + 1
+    assert core.paper.check_stability(laplacian).components == laplacian.component.max() + 1
 
 
 def test_float32_far_from_the_origin_is_refused(sphere):
@@ -165,11 +165,11 @@ class TestDuplicates:
     @pytest.mark.parametrize(
         "use",
         [
-            lambda on: core.geodesic_distance(on, [0]),
-            lambda on: core.grow(on, [0], 0.5).astype(float),
-            lambda on: core.segment(on, 4),
-            lambda on: core.smooth_points(on, 20, keep="area"),
-            lambda on: core.fair_points(on, keep="volume"),
+            lambda on: core.distance.geodesic_distance(on, [0]),
+            lambda on: core.distance.grow(on, [0], 0.5).astype(float),
+            lambda on: core.spectral.segment(on, 4),
+            lambda on: core.clean.smooth_points(on, 20, keep="area"),
+            lambda on: core.clean.fair_points(on, keep="volume"),
         ],
         ids=["distance", "grown", "parts", "smooth", "fair"],
     )
@@ -249,14 +249,14 @@ def test_points_with_no_others_within_their_kernels_are_left_out():
 
 
 ONE = {  # calls that take points by their indices, with the index of one
-    "distance": lambda laplacian, one: core.geodesic_distance(laplacian, one),
-    "nearest": lambda laplacian, one: core.nearest_source(laplacian, one),
-    "grow": lambda laplacian, one: core.grow(laplacian, one, 1.0),
-    "transport": lambda laplacian, one: core.transport(laplacian, one, [0.0, 1.0, 0.0]),
-    "map": lambda laplacian, one: core.logarithmic_map(laplacian, one),
-    "fixed": lambda laplacian, one: core.solve_poisson(laplacian, laplacian.points[:, 0], one, 0.0),
-    "inpaint": lambda laplacian, one: core.inpaint(laplacian, one, [2.0]),
-    "region": lambda laplacian, one: core.measure_region(laplacian, one).area,
+    "distance": lambda laplacian, one: core.distance.geodesic_distance(laplacian, one),
+    "nearest": lambda laplacian, one: core.distance.nearest_source(laplacian, one),
+    "grow": lambda laplacian, one: core.distance.grow(laplacian, one, 1.0),
+    "transport": lambda laplacian, one: core.distance.transport(laplacian, one, [0.0, 1.0, 0.0]),
+    "map": lambda laplacian, one: core.distance.logarithmic_map(laplacian, one),
+    "fixed": lambda laplacian, one: core.distance.solve_poisson(laplacian, laplacian.points[:, 0], one, 0.0),
+    "inpaint": lambda laplacian, one: core.rig.inpaint(laplacian, one, [2.0]),
+    "region": lambda laplacian, one: core.measure.measure_region(laplacian, one).area,
     "left out": lambda laplacian, one: core.build_laplacian(laplacian.points, left_out=one).areas,
 }
 
@@ -272,4 +272,4 @@ def test_the_index_of_one_point_is_a_set_of_points(operators, call):
 @pytest.mark.parametrize("wrong", [True, 7.0, 2500, "seven"])
 def test_no_index_of_one_point(operators, wrong):
     with pytest.raises(core.InvalidPointsError, match="Give whole numbers below 2500"):
-        core.geodesic_distance(operators("even sphere"), wrong)
+        core.distance.geodesic_distance(operators("even sphere"), wrong)

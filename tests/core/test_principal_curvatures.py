@@ -18,12 +18,12 @@ def shares(found, exact):
 @pytest.fixture(scope="module")
 def torus():
     laplacian = core.build_laplacian(torus_points(4200))
-    return laplacian, core.principal_curvatures(laplacian)
+    return laplacian, core.measure.principal_curvatures(laplacian)
 
 
 @pytest.mark.parametrize("radius", [0.01, 3000.0])
 def test_sphere_is_a_cap(radius):
-    found = core.principal_curvatures(core.build_laplacian(radius * random_sphere(2000)))
+    found = core.measure.principal_curvatures(core.build_laplacian(radius * random_sphere(2000)))
     assert_allclose(np.stack([found.first, found.second]), 1.0 / radius, rtol=0.08)
     assert_allclose(found.curvedness, 1.0 / radius, rtol=0.08)
     assert found.shape_index.min() > 0.97
@@ -31,7 +31,7 @@ def test_sphere_is_a_cap(radius):
 
 def test_inward_normals_make_a_cup_of_it():
     points = random_sphere(1000)
-    found = core.principal_curvatures(core.build_laplacian(points, normals=-points))
+    found = core.measure.principal_curvatures(core.build_laplacian(points, normals=-points))
     assert found.first.max() < -0.9
     assert found.shape_index.max() < -0.95
 
@@ -41,7 +41,7 @@ def test_torus(torus):
     radius = np.linalg.norm(laplacian.points[:, :2], axis=1)
     assert shares(found.first, np.full(len(radius), 1.0 / MINOR)) < 0.025
     assert shares(found.second, (1.0 - MAJOR / radius) / MINOR) < 0.1
-    assert_allclose(0.5 * (found.first + found.second), core.mean_curvature(laplacian), rtol=1e-12, atol=1e-12)
+    assert_allclose(0.5 * (found.first + found.second), core.measure.mean_curvature(laplacian), rtol=1e-12, atol=1e-12)
 
 
 def test_first_direction_of_a_torus_goes_around_its_tube(torus):
@@ -62,7 +62,7 @@ def test_shape_index_tells_ridge_saddle_valley_and_plane(bends, index):
     normals = np.column_stack([points[:, :2] * bends, np.ones(len(points))])
     laplacian = core.build_laplacian(points, normals=normals)
     middle = np.linalg.norm(points[:, :2], axis=1) < 0.1
-    found = core.principal_curvatures(laplacian)
+    found = core.measure.principal_curvatures(laplacian)
     if any(bends):
         assert_allclose(found.shape_index[middle], index, atol=0.1)
     assert_allclose(found.first[middle].mean(), bends[0], atol=0.1)
@@ -71,5 +71,5 @@ def test_shape_index_tells_ridge_saddle_valley_and_plane(bends, index):
 
 def test_point_left_out_is_flat():
     points = np.vstack([random_sphere(750), [[9.0, 9.0, 9.0]]])
-    found = core.principal_curvatures(core.build_laplacian(points))
+    found = core.measure.principal_curvatures(core.build_laplacian(points))
     assert found.first[-1] == found.second[-1] == found.curvedness[-1] == found.shape_index[-1] == 0.0

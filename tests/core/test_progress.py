@@ -8,12 +8,12 @@ import pytest
 import core
 from benchmarks.samplings import fibonacci_sphere
 from core.progress import ends_at_one
+from tests.public import PUBLIC
 
 
 def told():
     """Public functions and methods that tell their progress by stages."""
-    for name in core.__all__:
-        one = getattr(core, name)
+    for one in PUBLIC.values():
         calls = [one] if inspect.isfunction(one) else [call for _, call in inspect.getmembers(one, inspect.isfunction)]
         calls += [call.__func__ for _, call in inspect.getmembers(one, inspect.ismethod)]
         for call in calls:
@@ -35,17 +35,17 @@ def test_all_calls_end_it():
 
 CALLS = {
     "spectrum": lambda laplacian, **given: laplacian.eigenpairs(4, **given),
-    "distance": lambda laplacian, **given: core.geodesic_distance(laplacian, 0, **given),
-    "class": lambda laplacian, **given: core.Geodesics(laplacian, **given),
-    "several inside": lambda laplacian, **given: core.logarithmic_map(laplacian, 0, **given),
-    "heat": lambda laplacian, **given: core.Heat(laplacian, 0.1).advance(laplacian.points[:, 0], **given),
-    "smooth": lambda laplacian, **given: core.smooth_points(laplacian, 9, **given),
-    "mesh": lambda laplacian, **given: core.mesh_surface(laplacian, **given),
-    "segment": lambda laplacian, **given: core.segment(laplacian, 3, **given),
-    "volume": lambda laplacian, **given: core.enclosed_volume(laplacian, **given),
-    "poisson": lambda laplacian, **given: core.solve_poisson(laplacian, laplacian.points[:, 0], **given),
+    "distance": lambda laplacian, **given: core.distance.geodesic_distance(laplacian, 0, **given),
+    "class": lambda laplacian, **given: core.distance.Geodesics(laplacian, **given),
+    "several inside": lambda laplacian, **given: core.distance.logarithmic_map(laplacian, 0, **given),
+    "heat": lambda laplacian, **given: core.motion.Heat(laplacian, 0.1).advance(laplacian.points[:, 0], **given),
+    "smooth": lambda laplacian, **given: core.clean.smooth_points(laplacian, 9, **given),
+    "mesh": lambda laplacian, **given: core.surface.mesh_surface(laplacian, **given),
+    "segment": lambda laplacian, **given: core.spectral.segment(laplacian, 3, **given),
+    "volume": lambda laplacian, **given: core.measure.enclosed_volume(laplacian, **given),
+    "poisson": lambda laplacian, **given: core.distance.solve_poisson(laplacian, laplacian.points[:, 0], **given),
     "paper": lambda laplacian, **given: core.paper.build_laplacian(laplacian.points, **given),
-    "discs": lambda laplacian, **given: core.surface_discs(laplacian.points, **given),
+    "discs": lambda laplacian, **given: core.surface.surface_discs(laplacian.points, **given),
 }
 
 

@@ -132,7 +132,7 @@ class TestTheorem1:
         assert bounds[1] < 2.0 * bounds[0]
 
     def test_assumptions_hold_on_a_good_cloud(self, laplacian):
-        stability = core.check_stability(laplacian)
+        stability = core.paper.check_stability(laplacian)
         assert stability.concerns() == []
         assert stability.components == 1
         assert stability.row_sum < 1e-12
@@ -144,6 +144,6 @@ class TestTheorem1:
         sphere = random_sphere(300)
         options = LaplacianOptions(bandwidth="local", neighbors=13, bandwidth_factor=0.3)
         laplacian = core.build_laplacian(np.concatenate([sphere, sphere + [9.0, 0.0, 0.0]]), options=options)
-        concerns = " ".join(core.check_stability(laplacian).concerns())
+        concerns = " ".join(core.paper.check_stability(laplacian).concerns())
         assert "2 components" in concerns
         assert "A4" in concerns

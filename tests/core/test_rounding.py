@@ -62,8 +62,8 @@ def _ball(step):
 def test_sheets_by_depth_cameras_keep_their_points_and_area(tilt, step, noise, focal):
     points = _sheet(tilt, step, noise, focal)
     laplacian = core.build_laplacian(points)
-    parts = core.measure_parts(laplacian)
-    assert core.stray_points(points).mean() <= 0.01
+    parts = core.measure.measure_parts(laplacian)
+    assert core.clean.stray_points(points).mean() <= 0.01
     assert (laplacian.component < 0).mean() <= 0.01
     assert abs(parts.areas.sum() - _WIDTH * _HEIGHT) <= parts.area_uncertainties.sum()
     assert parts.area_uncertainties.sum() < 0.09 * _WIDTH * _HEIGHT
@@ -74,9 +74,9 @@ def test_sheets_by_depth_cameras_keep_their_points_and_area(tilt, step, noise, f
 def test_a_ball_by_a_depth_camera_keeps_its_points_and_area(step):
     points = _ball(step)
     laplacian = core.build_laplacian(points)
-    parts = core.measure_parts(laplacian)
+    parts = core.measure.measure_parts(laplacian)
     true = 2.0 * np.pi * _RADIUS**2 * (1.0 - np.sqrt(0.5))
-    assert core.stray_points(points).mean() <= 0.01
+    assert core.clean.stray_points(points).mean() <= 0.01
     assert abs(parts.areas.sum() - true) <= parts.area_uncertainties.sum()
 
 
@@ -99,12 +99,12 @@ def test_points_far_off_stay_strays():
     points = _sheet(2.0)
     chosen = np.arange(100, len(points), 400)
     points[chosen] += 6e-3 * _TURNED[:, 2]
-    assert core.stray_points(points)[chosen].mean() > 0.95
+    assert core.clean.stray_points(points)[chosen].mean() > 0.95
 
 
 def test_points_that_noise_lifts_by_one_step_only_now_and_then_are_no_strays():
     points = _sheet(0.0, noise=2e-4)
-    assert core.stray_points(points).mean() <= 0.001
+    assert core.clean.stray_points(points).mean() <= 0.001
 
 
 def test_tiles_agree_on_the_direction(tmp_path):

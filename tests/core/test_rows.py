@@ -74,7 +74,7 @@ def test_closed_rings_are_one_surface(across):
     assert np.all(laplacian.component == 0)
     turn = np.minimum(angle, 2.0 * np.pi - angle)
     exact = np.hypot(turn, height - height[0])
-    np.testing.assert_allclose(core.geodesic_distance(laplacian, [0]), exact, rtol=1e-2, atol=1e-2)
+    np.testing.assert_allclose(core.distance.geodesic_distance(laplacian, [0]), exact, rtol=1e-2, atol=1e-2)
 
 
 @pytest.mark.parametrize("radius", [np.inf, 40.0])

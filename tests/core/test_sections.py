@@ -17,7 +17,7 @@ def meshed(operators):
     def build(name):
         if name not in made:
             laplacian = operators(name)
-            made[name] = laplacian, core.mesh_surface(laplacian)
+            made[name] = laplacian, core.surface.mesh_surface(laplacian)
         return made[name]
 
     return build
@@ -25,7 +25,7 @@ def meshed(operators):
 
 def cut(cloud, point, normal):
     laplacian, mesh = cloud
-    return core.cross_section(laplacian, point, normal, mesh=mesh)
+    return core.measure.cross_section(laplacian, point, normal, mesh=mesh)
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +33,7 @@ def cylinder():
     rng = np.random.default_rng(5)
     angle, z = rng.uniform(0.0, 2.0 * np.pi, 3000), rng.uniform(0.0, 2.0, 3000)
     laplacian = core.build_laplacian(np.column_stack([np.cos(angle), np.sin(angle), z]))
-    return laplacian, core.mesh_surface(laplacian)
+    return laplacian, core.surface.mesh_surface(laplacian)
 
 
 @pytest.mark.parametrize("height", [0.0, 0.5, -0.9])
@@ -87,7 +87,7 @@ def test_along_a_cylinder_the_section_is_open_and_encloses_nothing(cylinder):
 def test_what_lies_inside_is_a_hole_and_what_lies_in_that_is_none():
     radii = np.array([1.5, 1.0, 0.5])
     points = np.concatenate([radius * fibonacci_sphere(int(1200 * radius**2)) for radius in radii])
-    found = core.cross_section(core.build_laplacian(points), (0.0, 0.0, 0.0), (1.0, 1.0, 0.0))
+    found = core.measure.cross_section(core.build_laplacian(points), (0.0, 0.0, 0.0), (1.0, 1.0, 0.0))
     areas = [curve.enclosed_area for curve in found.curves]
     np.testing.assert_allclose(areas, np.pi * radii**2 * [1.0, -1.0, 1.0], rtol=0.005)
 
@@ -95,14 +95,14 @@ def test_what_lies_inside_is_a_hole_and_what_lies_in_that_is_none():
 def test_it_follows_turn_translation_scale_and_order():
     points, rng = random_sphere(1500, 3) * [1.0, 0.8, 0.6], np.random.default_rng(1)
     place, normal = np.array([0.1, 0.2, 0.1]), np.array([1.0, 2.0, -1.0])
-    before = core.cross_section(core.build_laplacian(points), place, normal)
+    before = core.measure.cross_section(core.build_laplacian(points), place, normal)
     turn = Rotation.from_rotvec([0.3, -1.1, 0.7]).as_matrix()
     moved = 50.0 * points[rng.permutation(len(points))] @ turn.T + 7.0
     laplacian = core.build_laplacian(moved)
-    after = core.cross_section(laplacian, 50.0 * turn @ place + 7.0, -3.0 * turn @ normal)
+    after = core.measure.cross_section(laplacian, 50.0 * turn @ place + 7.0, -3.0 * turn @ normal)
     assert after.length == pytest.approx(50.0 * before.length, rel=1e-3)
     assert after.enclosed_area == pytest.approx(2500.0 * before.enclosed_area, rel=2e-3)
-    shifted = core.cross_section(core.build_laplacian(5.0 * points - 2.0), 5.0 * place - 2.0, normal)
+    shifted = core.measure.cross_section(core.build_laplacian(5.0 * points - 2.0), 5.0 * place - 2.0, normal)
     np.testing.assert_allclose(shifted.curves[0].points, 5.0 * before.curves[0].points - 2.0, rtol=0.0, atol=1e-6)
 
 
@@ -131,7 +131,7 @@ def test_it_can_be_cancelled():
             raise core.Cancelled
 
     with pytest.raises(core.Cancelled):
-        core.cross_section(core.build_laplacian(core.example_sphere()), (0, 0, 0), (0, 0, 1), progress=cancel)
+        core.measure.cross_section(core.build_laplacian(core.example_sphere()), (0, 0, 0), (0, 0, 1), progress=cancel)
 
 
 @pytest.mark.parametrize(
@@ -146,4 +146,4 @@ def test_it_can_be_cancelled():
 )
 def test_what_is_no_plane_is_refused(operators, point, normal, text):
     with pytest.raises(core.InvalidPointsError, match=text):
-        core.cross_section(operators("another random sphere"), point, normal)
+        core.measure.cross_section(operators("another random sphere"), point, normal)

@@ -45,7 +45,7 @@ def limbs(count=2400, seed=0):
 def body():
     points, owner = limbs()
     laplacian = core.build_laplacian(points)
-    return SimpleNamespace(points=points, owner=owner, laplacian=laplacian, labels=core.segment(laplacian, 5))
+    return SimpleNamespace(points=points, owner=owner, laplacian=laplacian, labels=core.spectral.segment(laplacian, 5))
 
 
 @pytest.fixture(scope="module")
@@ -120,7 +120,7 @@ class TestNearGraph:
 class TestNodalDomains:
     def test_stripes(self, square):
         wave = np.cos(3.0 * np.pi * square.points[:, 0])
-        domains = core.nodal_domains(wave, square)
+        domains = core.spectral.nodal_domains(square, wave)
         stripe = np.floor(3.0 * square.points[:, 0] + 0.5).astype(int)
         assert domains.max() == 3
         np.testing.assert_array_equal(np.unique(np.column_stack([domains, stripe]), axis=0)[:, 0], [0, 1, 2, 3])
@@ -130,7 +130,7 @@ class TestNodalDomains:
         field = (np.floor(3.0 * square.points[:, :2] + 0.5) @ [4, 1]).astype(int)
         sure = np.abs(wave) > 0.1
         for lift in (0.0, 0.03, -0.03):  # which opens a way between half of the fields at every crossing
-            domains = core.nodal_domains(wave + lift, square)
+            domains = core.spectral.nodal_domains(square, wave + lift)
             assert domains.max() == 15
             assert agreement(domains[sure], field[sure]) == 1.0
 
@@ -139,7 +139,7 @@ class TestNodalDomains:
         laplacian = core.build_laplacian(points, options=WIDE)
         spacing = 1.0 / np.sqrt(len(points))
         assert 3.0 * laplacian.smoothing_lengths.min() > 5.0 * spacing  # the kernel reaches across
-        domains = core.nodal_domains(np.abs(points[:, 0] - 0.5) - spacing, laplacian)
+        domains = core.spectral.nodal_domains(laplacian, np.abs(points[:, 0] - 0.5) - spacing)
         left, right = domains[points[:, 0] < 0.4], domains[points[:, 0] > 0.6]
         assert len(np.unique(left)) == len(np.unique(right)) == 1
         assert left[0] != right[0]
@@ -147,56 +147,56 @@ class TestNodalDomains:
     def test_a_low_bridge_and_a_high_one(self, square):
         x = square.points[:, 0]
         hills = np.exp(-0.5 * ((x - 0.25) / 0.08) ** 2) + 0.5 * np.exp(-0.5 * ((x - 0.75) / 0.08) ** 2)
-        assert core.nodal_domains(hills + 0.01, square).max() == 1
-        assert core.nodal_domains(hills + 0.01, square, bridge=0.0).max() == 0
-        assert core.nodal_domains(hills + 0.2, square).max() == 0
+        assert core.spectral.nodal_domains(square, hills + 0.01).max() == 1
+        assert core.spectral.nodal_domains(square, hills + 0.01, bridge=0.0).max() == 0
+        assert core.spectral.nodal_domains(square, hills + 0.2).max() == 0
 
     def test_specks_and_zeros_join_what_surrounds_them(self, square):
         x = square.points[:, 0] - 0.5
-        expected = core.nodal_domains(x, square)
+        expected = core.spectral.nodal_domains(square, x)
         spoiled = x.copy()
         deep = np.flatnonzero(np.abs(x) > 0.2)[::97]
         spoiled[deep] = -x[deep]
         spoiled[np.flatnonzero(np.abs(x) > 0.2)[50::97]] = 0.0
-        np.testing.assert_array_equal(core.nodal_domains(spoiled, square), expected)
+        np.testing.assert_array_equal(core.spectral.nodal_domains(square, spoiled), expected)
 
     def test_larger_first_then_the_higher_mean(self, rectangle):
         x = rectangle.points[:, 0] / 0.6
-        np.testing.assert_array_equal(core.nodal_domains(x + 0.37, rectangle) == 0, x > -0.37)
-        np.testing.assert_array_equal(core.nodal_domains(-x - 0.37, rectangle) == 0, x > -0.37)
+        np.testing.assert_array_equal(core.spectral.nodal_domains(rectangle, x + 0.37) == 0, x > -0.37)
+        np.testing.assert_array_equal(core.spectral.nodal_domains(rectangle, -x - 0.37) == 0, x > -0.37)
         even = core.build_laplacian(grid_points(np.arange(20.0), np.arange(17.0), [0.0]))
         for sign in (1.0, -1.0):
             values = sign * (even.points[:, 0] - 9.5)
-            np.testing.assert_array_equal(core.nodal_domains(values, even), (values < 0.0).astype(int))
+            np.testing.assert_array_equal(core.spectral.nodal_domains(even, values), (values < 0.0).astype(int))
 
     def test_sign_and_size_of_the_values_do_not_matter(self, square):
         values = np.sin(7.0 * square.points[:, 0]) + np.cos(5.0 * square.points[:, 1])
-        domains = core.nodal_domains(values, square)
-        np.testing.assert_array_equal(core.nodal_domains(1e-9 * values, square), domains)
-        assert agreement(core.nodal_domains(-values, square), domains) == 1.0
+        domains = core.spectral.nodal_domains(square, values)
+        np.testing.assert_array_equal(core.spectral.nodal_domains(square, 1e-9 * values), domains)
+        assert agreement(core.spectral.nodal_domains(square, -values), domains) == 1.0
 
     def test_components_and_points_left_out(self, two_spheres):
         z = two_spheres.points[:, 2].copy()
-        domains = core.nodal_domains(z, two_spheres)
+        domains = core.spectral.nodal_domains(two_spheres, z)
         np.testing.assert_array_equal(domains[600:603], -1)
         assert domains.max() == 3
         np.testing.assert_array_equal(np.unique(domains[603:]), [0, 1])
         z[:600] = 0.0  # the mode of another part
-        domains = core.nodal_domains(z, two_spheres)
+        domains = core.spectral.nodal_domains(two_spheres, z)
         assert domains.max() == 2
         assert len(np.unique(domains[:600])) == 1
 
     def test_no_sign_at_all(self, square):
-        assert np.all(core.nodal_domains(np.zeros(2500), square) == 0)
-        assert np.all(core.nodal_domains(np.full(2500, -3), square) == 0)
+        assert np.all(core.spectral.nodal_domains(square, np.zeros(2500)) == 0)
+        assert np.all(core.spectral.nodal_domains(square, np.full(2500, -3)) == 0)
 
     @pytest.mark.parametrize(("mode", "count"), [(4, 4), (10, 9)])
     def test_isometric_surfaces_have_the_same_domains(self, rectangle, mode, count):
         flat = rectangle.eigenpairs(11).eigenvectors[:, mode - 1]
         bent = core.build_laplacian(parabolic_cylinder(1.0))
         sure = np.abs(flat) > 0.02 * np.abs(flat).max()
-        first = core.nodal_domains(flat, rectangle)
-        second = core.nodal_domains(bent.eigenpairs(11).eigenvectors[:, mode - 1], bent)
+        first = core.spectral.nodal_domains(rectangle, flat)
+        second = core.spectral.nodal_domains(bent, bent.eigenpairs(11).eigenvectors[:, mode - 1])
         assert first.max() + 1 == count
         assert agreement(first[sure], second[sure]) >= 0.97
 
@@ -205,7 +205,9 @@ class TestNodalDomains:
         laplacian = core.build_laplacian(points)
         noise = 0.03 * np.sqrt(laplacian.areas.sum() / 1500) * np.random.default_rng(1).standard_normal((1500, 3))
         rough = core.build_laplacian(points + noise)
-        clean, noisy = (core.nodal_domains(each.eigenpairs(7).eigenvectors[:, 5], each) for each in (laplacian, rough))
+        clean, noisy = (
+            core.spectral.nodal_domains(each, each.eigenpairs(7).eigenvectors[:, 5]) for each in (laplacian, rough)
+        )
         assert clean.max() == 5
         assert agreement(clean, noisy) > 0.93
 
@@ -213,7 +215,7 @@ class TestNodalDomains:
     def test_the_second_mode_halves_a_sausage(self, bent):
         points, along = sausage(2000, bent)
         laplacian = core.build_laplacian(points)
-        domains = core.nodal_domains(laplacian.eigenpairs(2).eigenvectors[:, 1], laplacian)
+        domains = core.spectral.nodal_domains(laplacian, laplacian.eigenpairs(2).eigenvectors[:, 1])
         assert domains.max() == 1
         assert agreement(domains, (along > 3.0).astype(int)) > 0.97
 
@@ -228,12 +230,12 @@ class TestNodalDomains:
     )
     def test_values_that_make_no_sense(self, square, values, match):
         with pytest.raises(core.InvalidPointsError, match=match):
-            core.nodal_domains(values, square)
+            core.spectral.nodal_domains(square, values)
 
     @pytest.mark.parametrize("settings", [{"threshold": 1.0}, {"bridge": -0.1}, {"smallest": 0}])
     def test_settings_that_make_no_sense(self, square, settings):
         with pytest.raises(core.PointCloudError, match="nodal domain"):
-            core.nodal_domains(np.ones(2500), square, **settings)
+            core.spectral.nodal_domains(square, np.ones(2500), **settings)
 
 
 class TestSegment:
@@ -243,19 +245,19 @@ class TestSegment:
 
     @pytest.mark.parametrize("parts", [1, 2, 3, 7, 12])
     def test_all_parts_are_there_and_connected(self, body, parts):
-        labels = core.segment(body.laplacian, parts)
+        labels = core.spectral.segment(body.laplacian, parts)
         np.testing.assert_array_equal(np.unique(labels), np.arange(parts))
         assert pieces(labels, body.laplacian) == [1] * parts
 
     def test_signs_and_bases_do_not_matter(self, body):
-        spectrum = body.laplacian.eigenpairs(core.modes_needed(body.laplacian, 5))
-        np.testing.assert_array_equal(core.segment(body.laplacian, 5, spectrum=spectrum), body.labels)
+        spectrum = body.laplacian.eigenpairs(core.spectral.modes_needed(body.laplacian, 5))
+        np.testing.assert_array_equal(core.spectral.segment(body.laplacian, 5, spectrum=spectrum), body.labels)
         signs = np.where(np.arange(len(spectrum.eigenvalues)) % 2, 1.0, -1.0)
         turned = core.Spectrum(spectrum.eigenvalues, spectrum.eigenvectors * signs)
-        np.testing.assert_array_equal(core.segment(body.laplacian, 5, spectrum=turned), body.labels)
+        np.testing.assert_array_equal(core.spectral.segment(body.laplacian, 5, spectrum=turned), body.labels)
 
     def test_a_basis_of_modes_of_one_eigenvalue_does_not_matter(self, body):
-        count = core.modes_needed(body.laplacian, 5)
+        count = core.spectral.modes_needed(body.laplacian, 5)
         spectrum = body.laplacian.eigenpairs(count)
         values, vectors = spectrum.eigenvalues.copy(), spectrum.eigenvectors.copy()
         values[1:4] = values[1:4].mean()
@@ -267,23 +269,25 @@ class TestSegment:
         first, second = (pdist(_signature(body.laplacian, 5, spectrum, None)[::20]) for spectrum in (plain, turned))
         np.testing.assert_allclose(first, second, rtol=1e-9)
         # The longest axis of all points is ambiguous then: k-means may end some border points apart.
-        first, second = (core.segment(body.laplacian, 5, spectrum=spectrum) for spectrum in (plain, turned))
+        first, second = (core.spectral.segment(body.laplacian, 5, spectrum=spectrum) for spectrum in (plain, turned))
         assert agreement(first, second) > 0.99
 
     def test_a_longer_spectrum_gives_the_same_and_a_shorter_one_is_not_used(self, body):
-        count = core.modes_needed(body.laplacian, 5)
+        count = core.spectral.modes_needed(body.laplacian, 5)
         assert (
-            agreement(core.segment(body.laplacian, 5, spectrum=body.laplacian.eigenpairs(count + 9)), body.labels)
+            agreement(
+                core.spectral.segment(body.laplacian, 5, spectrum=body.laplacian.eigenpairs(count + 9)), body.labels
+            )
             > 0.999
         )
         np.testing.assert_array_equal(
-            core.segment(body.laplacian, 5, spectrum=body.laplacian.eigenpairs(4)), body.labels
+            core.spectral.segment(body.laplacian, 5, spectrum=body.laplacian.eigenpairs(4)), body.labels
         )
 
     @pytest.mark.parametrize("parts", [2, 5, 12])
     def test_the_modes_of_a_sphere_do_not_make_it_fail(self, operators, parts):
         laplacian = operators("even sphere")
-        labels = core.segment(laplacian, parts)
+        labels = core.spectral.segment(laplacian, parts)
         size = np.bincount(labels)
         assert pieces(labels, laplacian) == [1] * parts
         assert size.min() > 0.5 * size.mean()
@@ -291,24 +295,24 @@ class TestSegment:
     def test_density_does_not_matter(self, body):
         more = limbs(900, 1)[0]
         uneven = core.build_laplacian(np.concatenate([body.points, more[more[:, 0] > 0.0]]))
-        labels = core.segment(uneven, 5)[: len(body.points)]
+        labels = core.spectral.segment(uneven, 5)[: len(body.points)]
         assert agreement(labels, body.labels) > 0.95
 
     def test_components_get_parts_by_their_areas(self, two_spheres):
-        labels = core.segment(two_spheres, 2)
+        labels = core.spectral.segment(two_spheres, 2)
         np.testing.assert_array_equal(labels, np.repeat([1, -1, 0], [600, 3, 1500]))
-        labels = core.segment(two_spheres, 6)
+        labels = core.spectral.segment(two_spheres, 6)
         np.testing.assert_array_equal(labels[600:603], -1)
         small, large = np.unique(labels[:600]), np.unique(labels[603:])
         assert (len(small), len(large)) == (2, 4)  # of areas 0.36 and 1
         assert pieces(labels, two_spheres) == [1] * 6
-        assert len(np.unique(core.segment(two_spheres, 12)[:600])) == 3
+        assert len(np.unique(core.spectral.segment(two_spheres, 12)[:600])) == 3
 
     def test_fewer_modes_are_resolved_than_wanted(self):
         parts, rectangle = 35, core.build_laplacian(parabolic_cylinder(0.0), options=WIDE)
         with pytest.raises(core.UnresolvedModesError):
-            rectangle.eigenpairs(core.modes_needed(rectangle, parts))
-        assert pieces(core.segment(rectangle, parts), rectangle) == [1] * parts
+            rectangle.eigenpairs(core.spectral.modes_needed(rectangle, parts))
+        assert pieces(core.spectral.segment(rectangle, parts), rectangle) == [1] * parts
 
     @pytest.mark.parametrize(
         ("parts", "error", "match"),
@@ -323,13 +327,13 @@ class TestSegment:
     )
     def test_impossible_numbers_of_parts(self, two_spheres, parts, error, match):
         with pytest.raises(error, match=match):
-            core.segment(two_spheres, parts)
+            core.spectral.segment(two_spheres, parts)
 
     def test_a_spectrum_of_other_points(self, body, two_spheres):
         with pytest.raises(core.InvalidPointsError, match="same operator"):
-            core.segment(body.laplacian, 3, spectrum=two_spheres.eigenpairs(3))
+            core.spectral.segment(body.laplacian, 3, spectrum=two_spheres.eigenpairs(3))
 
     def test_stages_are_reported(self, body):
         stages = []
-        core.segment(body.laplacian, 3, progress=lambda stage, fraction: stages.append(stage))
+        core.spectral.segment(body.laplacian, 3, progress=lambda stage, fraction: stages.append(stage))
         assert set(stages) == {"Spectrum", "Parts"}

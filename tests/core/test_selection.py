@@ -15,25 +15,25 @@ def sphere():
 @pytest.mark.parametrize("distance", [0.3, 1.0, 2.0])
 def test_a_cap_of_a_sphere(sphere, distance):
     angle = np.arccos(np.clip(sphere.points @ sphere.points[5], -1.0, 1.0))
-    grown = core.grow(sphere, [5], distance)
+    grown = core.distance.grow(sphere, [5], distance)
     assert np.all(grown[angle < 0.95 * distance])
     assert not np.any(grown[angle > 1.005 * distance])
 
 
 def test_from_several_points_and_from_a_mask(sphere):
-    both = core.grow(sphere, [5, 900], 0.4)
-    np.testing.assert_array_equal(both, core.grow(sphere, [5], 0.4) | core.grow(sphere, [900], 0.4))
-    np.testing.assert_array_equal(core.grow(sphere, np.isin(np.arange(3000), [5, 900]), 0.4), both)
+    both = core.distance.grow(sphere, [5, 900], 0.4)
+    np.testing.assert_array_equal(both, core.distance.grow(sphere, [5], 0.4) | core.distance.grow(sphere, [900], 0.4))
+    np.testing.assert_array_equal(core.distance.grow(sphere, np.isin(np.arange(3000), [5, 900]), 0.4), both)
 
 
 def test_nothing_grows_from_nothing_or_by_nothing(sphere):
-    assert not core.grow(sphere, [], 1.0).any()
-    np.testing.assert_array_equal(np.flatnonzero(core.grow(sphere, [17, 3], 0.0)), [3, 17])
+    assert not core.distance.grow(sphere, [], 1.0).any()
+    np.testing.assert_array_equal(np.flatnonzero(core.distance.grow(sphere, [17, 3], 0.0)), [3, 17])
 
 
 def test_along_a_bent_sausage_and_not_across_the_gap(operators):
     laplacian, along = operators("bent capsule"), sausage(bent=True)[1]
-    grown = core.grow(laplacian, along < 0.0, 1.5)
+    grown = core.distance.grow(laplacian, along < 0.0, 1.5)
     assert np.all(grown[along < 1.3])
     assert not np.any(grown[along > 1.7])
 
@@ -41,12 +41,12 @@ def test_along_a_bent_sausage_and_not_across_the_gap(operators):
 @pytest.mark.parametrize("distance", [-1.0, np.nan, None, "far"])
 def test_distances_that_make_no_sense(sphere, distance):
     with pytest.raises(core.PointCloudError, match="distance to grow by"):
-        core.grow(sphere, [0], distance)
+        core.distance.grow(sphere, [0], distance)
 
 
 def test_unknown_points(sphere):
     with pytest.raises(core.InvalidPointsError, match="below 3000"):
-        core.grow(sphere, [3000], 1.0)
+        core.distance.grow(sphere, [3000], 1.0)
 
 
 class TestOppositeEnds:
@@ -55,7 +55,7 @@ class TestOppositeEnds:
         return np.random.default_rng(3).random((2000, 3)) * (6.0, 1.0, 0.0)
 
     def test_of_a_strip_they_are_quarters_of_discs_at_opposite_corners(self, strip):
-        ends = core.opposite_ends(core.build_laplacian(strip), share=0.05)
+        ends = core.distance.opposite_ends(core.build_laplacian(strip), share=0.05)
         radius = np.sqrt(4.0 * 0.05 * 6.0 / np.pi)  # of a quarter of a disc that has this share of 6 x 1
         corners = np.array([[x, y, 0.0] for x in (0.0, 6.0) for y in (0.0, 1.0)])
         found = []
@@ -70,20 +70,20 @@ class TestOppositeEnds:
 
     def test_they_lie_on_the_largest_component(self):
         points = np.concatenate([0.3 * random_sphere(400) + [9.0, 0.0, 0.0], random_sphere(750)])
-        for rows in core.opposite_ends(core.build_laplacian(points)):
+        for rows in core.distance.opposite_ends(core.build_laplacian(points)):
             assert rows.min() >= 400
 
     def test_three_points_at_least(self, sphere):
-        assert [len(rows) for rows in core.opposite_ends(sphere, 1e-9)] == [3, 3]
+        assert [len(rows) for rows in core.distance.opposite_ends(sphere, 1e-9)] == [3, 3]
 
     @pytest.mark.parametrize("share", [0.0, -1.0, 0.3, np.nan])
     def test_shares_out_of_bounds(self, sphere, share):
         with pytest.raises(core.PointCloudError, match="Use a number above 0, up to 0.25"):
-            core.opposite_ends(sphere, share)
+            core.distance.opposite_ends(sphere, share)
 
     @pytest.mark.parametrize("share", [0.01, 0.05, 0.25])
     def test_on_a_sphere_they_are_caps_of_that_area_around_opposite_points(self, sphere, share):
-        one, other = core.opposite_ends(sphere, share)
+        one, other = core.distance.opposite_ends(sphere, share)
         assert sphere.areas[one].sum() / sphere.areas.sum() == pytest.approx(share, abs=0.003)
         assert sphere.areas[other].sum() / sphere.areas.sum() == pytest.approx(share, abs=0.003)
         assert not np.intersect1d(one, other).size
@@ -101,7 +101,7 @@ class TestFrontPoint:
     RAYS = np.random.default_rng(3).uniform(-0.65, 0.65, (200, 2))
 
     def picked(self, points, reach):
-        return [core.front_point(points, [x, y, 5.0], [0.0, 0.0, -1.0], reach) for x, y in self.RAYS]
+        return [core.distance.front_point(points, [x, y, 5.0], [0.0, 0.0, -1.0], reach) for x, y in self.RAYS]
 
     def test_on_the_near_side_of_a_sphere(self):
         points = random_sphere(2100)
@@ -113,12 +113,12 @@ class TestFrontPoint:
         flat = np.column_stack([np.mgrid[-1:1:60j, -1:1:60j].reshape(2, -1).T, np.zeros(3600)])
         slant = flat * [1.0, 1.0, 0.0] + 1.5 * flat[:, :1] * [0.0, 0.0, 1.0]
         for index in (1000, 1830, 2500):
-            assert core.front_point(slant, slant[index] + [0.0, 0.0, 5.0], [0.0, 0.0, -2.0], 0.1) == index
+            assert core.distance.front_point(slant, slant[index] + [0.0, 0.0, 5.0], [0.0, 0.0, -2.0], 0.1) == index
 
     def test_a_direction_of_no_length(self):
         with pytest.raises(core.PointCloudError, match="has zero length"):
-            core.front_point([[0.0, 0.0, 1.0]], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], 1.0)
+            core.distance.front_point([[0.0, 0.0, 1.0]], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], 1.0)
 
     def test_nothing_behind_the_eye_far_from_the_ray_or_without_a_place(self):
         points = np.array([[0.0, 0.0, 9.0], [3.0, 0.0, 0.0], [np.nan, 0.0, 0.0], [np.inf, 0.0, 0.0]])
-        assert core.front_point(points, [0.0, 0.0, 5.0], [0.0, 0.0, -1.0], 0.5) == -1
+        assert core.distance.front_point(points, [0.0, 0.0, 5.0], [0.0, 0.0, -1.0], 0.5) == -1

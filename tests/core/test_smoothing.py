@@ -57,9 +57,9 @@ def components():
 
 
 SMOOTHERS = {
-    "modes": lambda laplacian, **settings: core.smooth_points(laplacian, 100, **settings),
-    "fairing": core.fair_points,
-    "band": lambda laplacian, **settings: core.smooth_points(laplacian, core.band(0.0, 110.0), **settings),
+    "modes": lambda laplacian, **settings: core.clean.smooth_points(laplacian, 100, **settings),
+    "fairing": core.clean.fair_points,
+    "band": lambda laplacian, **settings: core.clean.smooth_points(laplacian, core.clean.band(0.0, 110.0), **settings),
 }
 
 
@@ -92,24 +92,24 @@ def size_of(laplacian, kind):
 
 @pytest.mark.parametrize("keep", ["area", "volume"])
 def test_size_is_kept_where_the_filter_shrinks(clouds, ellipsoid, keep):
-    shrinking = core.exponential(0.1)
+    shrinking = core.clean.exponential(0.1)
     for laplacian, tolerance in ((ellipsoid, 6e-3), (clouds[False][0], 1e-2)):
-        assert rms(core.smooth_points(laplacian, shrinking)) < 0.9 * rms(laplacian.points)
-        kept = core.build_laplacian(core.smooth_points(laplacian, shrinking, keep=keep))
+        assert rms(core.clean.smooth_points(laplacian, shrinking)) < 0.9 * rms(laplacian.points)
+        kept = core.build_laplacian(core.clean.smooth_points(laplacian, shrinking, keep=keep))
         assert size_of(kept, keep) == pytest.approx(size_of(laplacian, keep), rel=tolerance)
 
 
 def test_kept_volume_of_the_sphere_is_its_own():
     laplacian = core.build_laplacian(fibonacci_sphere(750))
     for keep in ("area", "volume"):
-        radius = np.linalg.norm(core.smooth_points(laplacian, core.exponential(0.2), keep=keep), axis=1)
+        radius = np.linalg.norm(core.clean.smooth_points(laplacian, core.clean.exponential(0.2), keep=keep), axis=1)
         np.testing.assert_allclose(radius, 1.0, atol=1e-3)
 
 
 @pytest.mark.parametrize("keep", ["area", "volume"])
 def test_size_is_kept_under_a_mask(ellipsoid, keep):
     mask = np.clip(ellipsoid.points[:, 0] + 0.3, 0.0, 1.0)
-    moved = core.smooth_points(ellipsoid, core.exponential(0.05), mask=mask, keep=keep)
+    moved = core.clean.smooth_points(ellipsoid, core.clean.exponential(0.05), mask=mask, keep=keep)
     np.testing.assert_array_equal(moved[mask == 0.0], ellipsoid.points[mask == 0.0])
     assert np.abs(moved - ellipsoid.points).max() > 1e-3
     assert size_of(core.build_laplacian(moved), keep) == pytest.approx(size_of(ellipsoid, keep), rel=3e-3)
@@ -117,33 +117,35 @@ def test_size_is_kept_under_a_mask(ellipsoid, keep):
 
 def test_exponential_shrinks_the_sphere_by_its_factor():
     laplacian = core.build_laplacian(fibonacci_sphere(750))
-    found = core.smooth_points(laplacian, core.exponential(0.1))
+    found = core.clean.smooth_points(laplacian, core.clean.exponential(0.1))
     np.testing.assert_allclose(found, np.exp(-0.2) * laplacian.points, atol=2e-3)
-    found = core.fair_points(laplacian, 0.1, order=1)
+    found = core.clean.fair_points(laplacian, 0.1, order=1)
     np.testing.assert_allclose(found, laplacian.points / 1.2, atol=2e-3)
-    found = core.fair_points(laplacian, 0.1, order=2)
+    found = core.clean.fair_points(laplacian, 0.1, order=2)
     np.testing.assert_allclose(found, laplacian.points / 1.04, atol=2e-3)
 
 
 def test_few_modes_of_a_sphere_give_the_sphere():
     laplacian = core.build_laplacian(fibonacci_sphere(750) + [3.0, 0.0, -2.0])
-    np.testing.assert_allclose(core.smooth_points(laplacian, 4), laplacian.points, atol=5e-3)
+    np.testing.assert_allclose(core.clean.smooth_points(laplacian, 4), laplacian.points, atol=5e-3)
 
 
 def test_details_are_boosted(clouds):
     laplacian = core.build_laplacian(noisy_sphere(1000, True, 0.0)[0])
-    boosted = core.smooth_points(laplacian, core.boost(1.5, 15.0))
+    boosted = core.clean.smooth_points(laplacian, core.clean.boost(1.5, 15.0))
     error, height = radial(boosted, False)
     assert 1.35 < height < 1.6
     assert abs(error.mean()) < 1e-2
     spectrum = laplacian.eigenpairs(120)
-    np.testing.assert_allclose(core.smooth_points(laplacian, core.boost(1.5, 15.0), spectrum), boosted, atol=1e-2)
+    np.testing.assert_allclose(
+        core.clean.smooth_points(laplacian, core.clean.boost(1.5, 15.0), spectrum), boosted, atol=1e-2
+    )
 
 
 def test_spectrum_given_or_computed_is_the_same(ellipsoid):
     spectrum = ellipsoid.eigenpairs(40)
     np.testing.assert_allclose(
-        core.smooth_points(ellipsoid, 20, spectrum), core.smooth_points(ellipsoid, 20), atol=1e-8
+        core.clean.smooth_points(ellipsoid, 20, spectrum), core.clean.smooth_points(ellipsoid, 20), atol=1e-8
     )
 
 
@@ -152,18 +154,18 @@ def test_modes_beyond_those_resolved_serve_a_reconstruction():
     ellipsoid = core.build_laplacian(fibonacci_sphere(600) * [1.0, 0.8, 0.6], options=wide)
     with pytest.raises(core.UnresolvedModesError):
         ellipsoid.eigenpairs(180)
-    errors = [rms(core.smooth_points(ellipsoid, count) - ellipsoid.points) for count in (10, 50, 180)]
+    errors = [rms(core.clean.smooth_points(ellipsoid, count) - ellipsoid.points) for count in (10, 50, 180)]
     assert errors[0] > errors[1] > errors[2]
     assert errors[2] < 2e-3
 
 
 def test_strength_and_mask_blend(ellipsoid):
-    full = core.smooth_points(ellipsoid, 10) - ellipsoid.points
+    full = core.clean.smooth_points(ellipsoid, 10) - ellipsoid.points
     mask = np.linspace(0.0, 1.0, 1000)
     for strength in (0.5, 2.0, -1.0):
-        moved = core.smooth_points(ellipsoid, 10, strength=strength, mask=mask) - ellipsoid.points
+        moved = core.clean.smooth_points(ellipsoid, 10, strength=strength, mask=mask) - ellipsoid.points
         np.testing.assert_allclose(moved, strength * mask[:, None] * full, atol=1e-9)
-    faired = core.fair_points(ellipsoid, 0.01, mask=mask > 0.5) - ellipsoid.points
+    faired = core.clean.fair_points(ellipsoid, 0.01, mask=mask > 0.5) - ellipsoid.points
     assert np.all(faired[mask <= 0.5] == 0.0)
     assert np.all(np.any(faired[mask > 0.5] != 0.0, axis=1))
 
@@ -172,10 +174,10 @@ def test_components_keep_their_places_and_lone_points_stay(components):
     part = components.component
     assert part.max() == 1
     for found in (
-        core.smooth_points(components, core.exponential(9.0)),
-        core.smooth_points(components, 8),
-        core.smooth_points(components, core.exponential(0.1), keep="area"),
-        core.fair_points(components, keep="volume"),
+        core.clean.smooth_points(components, core.clean.exponential(9.0)),
+        core.clean.smooth_points(components, 8),
+        core.clean.smooth_points(components, core.clean.exponential(0.1), keep="area"),
+        core.clean.fair_points(components, keep="volume"),
     ):
         assert np.isfinite(found).all()
         np.testing.assert_array_equal(found[part < 0], components.points[part < 0])
@@ -184,7 +186,7 @@ def test_components_keep_their_places_and_lone_points_stay(components):
 
 
 def test_each_component_keeps_its_own_size(components):
-    found = core.smooth_points(components, core.exponential(0.05), keep="volume")
+    found = core.clean.smooth_points(components, core.clean.exponential(0.05), keep="volume")
     for number, radius, center in ((0, 1.0, [0.0, 0.0, 0.0]), (1, 0.5, [5.0, 0.0, 0.0])):
         inside = components.component == number
         np.testing.assert_allclose(np.linalg.norm(found[inside] - center, axis=1), radius, rtol=4e-3)
@@ -193,7 +195,7 @@ def test_each_component_keeps_its_own_size(components):
 @pytest.mark.parametrize("count", [1, 2])
 def test_constants_alone_are_no_shape(components, count):
     with pytest.raises(core.PointCloudError, match=r"2 component.* at least 5"):
-        core.smooth_points(components, count)
+        core.clean.smooth_points(components, count)
 
 
 class TestBoundary:
@@ -206,10 +208,10 @@ class TestBoundary:
         np.testing.assert_allclose(moved[near], distance[near], atol=0.03)
         assert np.all(moved[~near] == 0.0)
 
-    @pytest.mark.parametrize("response", [core.exponential(0.05), core.fairing(0.01), 21])
+    @pytest.mark.parametrize("response", [core.clean.exponential(0.05), core.clean.fairing(0.01), 21])
     def test_a_flat_square_stays(self, response):
         laplacian = core.build_laplacian(square_grid(21))
-        moved = core.smooth_points(laplacian, response, dirichlet=True)
+        moved = core.clean.smooth_points(laplacian, response, dirichlet=True)
         np.testing.assert_array_equal(moved[laplacian.boundary], laplacian.points[laplacian.boundary])
         corner = np.all(np.abs(laplacian.points[:, :2] - 0.5) > 0.2, axis=1)
         np.testing.assert_allclose(moved[~corner], laplacian.points[~corner], atol=4e-3)
@@ -217,7 +219,7 @@ class TestBoundary:
 
     def test_a_flat_disc_of_random_points_stays(self):
         laplacian = core.build_laplacian(disc_random(1000)[0])
-        moved = core.fair_points(laplacian, dirichlet=True) - laplacian.points
+        moved = core.clean.fair_points(laplacian, dirichlet=True) - laplacian.points
         assert np.linalg.norm(moved, axis=1).max() < 0.04  # the spacing
         assert rms(np.linalg.norm(moved, axis=1)) < 8e-3
 
@@ -227,28 +229,28 @@ class TestBoundary:
         noise = 0.02 * np.random.default_rng(0).standard_normal(len(points))
         noise[np.abs(points[:, 2]) > 0.99] = 0.0
         laplacian = core.build_laplacian(points + noise[:, None] * radial)
-        moved = core.fair_points(laplacian, dirichlet=True)
+        moved = core.clean.fair_points(laplacian, dirichlet=True)
         boundary = np.abs(points[:, 2]) > 0.99
         np.testing.assert_array_equal(moved[laplacian.boundary], laplacian.points[laplacian.boundary])
         assert np.mean(laplacian.boundary[boundary]) > 0.95
         assert rms(np.linalg.norm(moved[:, :2], axis=1) - 2.0) < rms(noise) / 2.5
-        free = core.fair_points(laplacian)
+        free = core.clean.fair_points(laplacian)
         assert np.abs(free[boundary, 2]).mean() < np.abs(moved[boundary, 2]).mean()
 
     def test_parts_without_a_boundary_are_not_in_the_way(self):
         ball = 0.5 * fibonacci_sphere(600) + [0.0, 0.0, 4.0]
         laplacian = core.build_laplacian(np.concatenate([hemisphere_random(750), ball]))
         assert laplacian.boundary.any()
-        moved = core.smooth_points(laplacian, core.fairing(1e-3), dirichlet=True)
+        moved = core.clean.smooth_points(laplacian, core.clean.fairing(1e-3), dirichlet=True)
         assert np.isfinite(moved).all()
         np.testing.assert_allclose(moved[750:], ball, atol=5e-3)
 
     def test_an_open_surface_has_no_volume(self):
         laplacian = core.build_laplacian(square_grid(20))
         with pytest.raises(core.PointCloudError, match="enclose no volume"):
-            core.fair_points(laplacian, keep="volume")
+            core.clean.fair_points(laplacian, keep="volume")
         with pytest.raises(core.PointCloudError, match="keep neither"):
-            core.fair_points(laplacian, keep="area", dirichlet=True)
+            core.clean.fair_points(laplacian, keep="area", dirichlet=True)
 
 
 @pytest.mark.parametrize("signs", [-1.0, "random"])
@@ -257,12 +259,12 @@ def test_normals_that_do_not_point_outwards_enclose_no_volume(ellipsoid, signs):
         signs = np.random.default_rng(0).choice([-1.0, 1.0], 1000)[:, None]
     laplacian = core.build_laplacian(ellipsoid.points, signs * ellipsoid.normals)
     with pytest.raises(core.PointCloudError, match="point outwards"):
-        core.fair_points(laplacian, keep="volume")
+        core.clean.fair_points(laplacian, keep="volume")
 
 
 def test_a_size_that_is_lost_cannot_be_kept(ellipsoid):
     with pytest.raises(core.SolverError, match="lose so much"):
-        core.smooth_points(ellipsoid, core.exponential(5.0), keep="area")
+        core.clean.smooth_points(ellipsoid, core.clean.exponential(5.0), keep="area")
 
 
 @pytest.mark.parametrize(
@@ -277,7 +279,7 @@ def test_a_size_that_is_lost_cannot_be_kept(ellipsoid):
     ],
 )
 def test_bad_settings(ellipsoid, settings, words):
-    for smoother in (core.fair_points, lambda *given, **named: core.smooth_points(*given, 10, **named)):
+    for smoother in (core.clean.fair_points, lambda *given, **named: core.clean.smooth_points(*given, 10, **named)):
         with pytest.raises(core.PointCloudError, match=words):
             smoother(ellipsoid, **settings)
 
@@ -285,28 +287,28 @@ def test_bad_settings(ellipsoid, settings, words):
 @pytest.mark.parametrize("response", [None, 2.5, True, "all"])
 def test_responses_that_are_neither_number_nor_function(ellipsoid, response):
     with pytest.raises(core.PointCloudError, match="whole number of modes, or a function"):
-        core.smooth_points(ellipsoid, response)
+        core.clean.smooth_points(ellipsoid, response)
 
 
 @pytest.mark.parametrize("settings", [{"time": -1.0}, {"time": np.nan}, {"time": 1.0, "order": 4}])
 def test_bad_fairing(ellipsoid, settings):
     with pytest.raises(core.PointCloudError, match="fairing"):
-        core.fair_points(ellipsoid, **settings)
+        core.clean.fair_points(ellipsoid, **settings)
 
 
 class TestMode:
     def test_displacement_along_the_normals(self, ellipsoid):
         mode = ellipsoid.eigenpairs(5).eigenvectors[:, 4]
-        full = core.displace_by_mode(ellipsoid, mode, 0.2) - ellipsoid.points
+        full = core.clean.displace_by_mode(ellipsoid, mode, 0.2) - ellipsoid.points
         np.testing.assert_allclose(np.einsum("ic,ic->i", full, ellipsoid.normals), 0.2 * mode / np.abs(mode).max())
         assert np.linalg.norm(full, axis=1).max() == pytest.approx(0.2)
         for phase in (0.0, 1.0, np.pi):
-            moved = core.displace_by_mode(ellipsoid, mode, 0.2, phase=phase) - ellipsoid.points
+            moved = core.clean.displace_by_mode(ellipsoid, mode, 0.2, phase=phase) - ellipsoid.points
             np.testing.assert_allclose(moved, np.cos(phase) * full, atol=1e-12)
 
     def test_default_amplitude_follows_the_size(self, ellipsoid):
         mode = ellipsoid.points[:, 0]
-        moved = core.displace_by_mode(ellipsoid, mode) - ellipsoid.points
+        moved = core.clean.displace_by_mode(ellipsoid, mode) - ellipsoid.points
         assert np.linalg.norm(moved, axis=1).max() == pytest.approx(0.1 * rms(np.linalg.norm(ellipsoid.points, axis=1)))
 
     @pytest.mark.parametrize(
@@ -321,7 +323,7 @@ class TestMode:
     )
     def test_bad_modes(self, ellipsoid, mode, amplitude, words):
         with pytest.raises(core.PointCloudError, match=words):
-            core.displace_by_mode(ellipsoid, mode, amplitude)
+            core.clean.displace_by_mode(ellipsoid, mode, amplitude)
 
 
 def test_progress_can_cancel(ellipsoid):
@@ -329,8 +331,8 @@ def test_progress_can_cancel(ellipsoid):
         raise core.Cancelled
 
     for work in (
-        lambda: core.smooth_points(ellipsoid, 10, progress=cancel),
-        lambda: core.fair_points(ellipsoid, 0.05, progress=cancel),
+        lambda: core.clean.smooth_points(ellipsoid, 10, progress=cancel),
+        lambda: core.clean.fair_points(ellipsoid, 0.05, progress=cancel),
     ):
         with pytest.raises(core.Cancelled):
             work()
@@ -340,7 +342,7 @@ class TestRoughness:
     @pytest.mark.parametrize("bumpy", [False, True])
     def test_is_the_noise_and_not_the_shape(self, clouds, bumpy):
         laplacian, noise = clouds[bumpy]
-        rough = core.roughness(laplacian, 0.5)
+        rough = core.clean.roughness(laplacian, 0.5)
         assert np.corrcoef(rough, noise)[0, 1] > 0.97
         assert rms(rough) == pytest.approx(rms(noise), rel=0.1)
 
@@ -351,21 +353,21 @@ class TestRoughness:
             grid[:, 2] = 0.005 * np.sin(2.0 * np.pi * waves * grid[:, 0])
             normals = np.tile([0.0, 0.0, 1.0], (len(grid), 1))
             inner = np.abs(grid[:, :2] - 0.5).max(axis=1) < 0.3
-            rough = core.roughness(core.build_laplacian(grid, normals), 0.125)  # that of eight waves
+            rough = core.clean.roughness(core.build_laplacian(grid, normals), 0.125)  # that of eight waves
             heights[waves] = rms(rough[inner]) / rms(grid[inner, 2])
         assert heights[4] < 0.05
         assert heights[16] > 0.9
 
     def test_scales_and_turns_its_sign_with_the_normals(self, clouds):
         laplacian, _ = clouds[False]
-        rough = core.roughness(laplacian, 0.5)
+        rough = core.clean.roughness(laplacian, 0.5)
         larger = core.build_laplacian(4.0 * laplacian.points, -laplacian.normals)
-        np.testing.assert_allclose(core.roughness(larger, 2.0), -4.0 * rough, rtol=0.0, atol=1e-3)
+        np.testing.assert_allclose(core.clean.roughness(larger, 2.0), -4.0 * rough, rtol=0.0, atol=1e-3)
 
     def test_point_left_out_is_not_rough(self, components):
-        assert np.all(core.roughness(components)[-2:] == 0.0)
+        assert np.all(core.clean.roughness(components)[-2:] == 0.0)
 
     @pytest.mark.parametrize("wavelength", [0.0, -1.0, np.nan, np.inf])
     def test_wavelength_that_makes_no_sense(self, ellipsoid, wavelength):
         with pytest.raises(core.PointCloudError, match="above zero"):
-            core.roughness(ellipsoid, wavelength)
+            core.clean.roughness(ellipsoid, wavelength)

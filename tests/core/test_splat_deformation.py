@@ -25,7 +25,7 @@ def bound_bar():
     laplacian = core.build_laplacian(points)
     reach = 2.5 * LENGTH / 48
     fixed, moved = np.flatnonzero(points[:, 0] < reach), np.flatnonzero(points[:, 0] > LENGTH - reach)
-    return splats_on(laplacian), core.Deformer(laplacian, moved, fixed)
+    return splats_on(laplacian), core.deform.Deformer(laplacian, moved, fixed)
 
 
 def splats_on(laplacian, degree=3):
@@ -36,7 +36,7 @@ def splats_on(laplacian, degree=3):
     frames = np.stack([tangent, np.cross(normals, tangent), normals], axis=2)
     rng = np.random.default_rng(3)
     spacing = np.sqrt(laplacian.areas)
-    return core.Splats(
+    return core.splats.Splats(
         points,
         spacing[:, None] * np.column_stack([rng.uniform(0.3, 0.7, (len(points), 2)), np.full(len(points), 0.05)]),
         quaternions_of(np.moveaxis(frames, 0, 2)),
@@ -50,7 +50,7 @@ def test_gradients_of_similarities_are_these():
     for points in (random_sphere(800), bar(8, 32)[0]):
         laplacian = core.build_laplacian(points)
         for scale in (1.0, 0.01, 300.0):
-            found = core.deformation_gradients(laplacian, scale * points @ TURN.T + [5.0, -3.0, 8.0])
+            found = core.deform.deformation_gradients(laplacian, scale * points @ TURN.T + [5.0, -3.0, 8.0])
             np.testing.assert_allclose(found, np.tile(scale * TURN, (len(points), 1, 1)), atol=1e-10 * scale)
 
 
@@ -59,7 +59,7 @@ def test_gradients_of_linear_maps_are_these_along_the_surface():
     errors = []
     for count in (1000, 4000):
         points = random_sphere(count)
-        found = core.deformation_gradients(core.build_laplacian(points), points @ linear.T)
+        found = core.deform.deformation_gradients(core.build_laplacian(points), points @ linear.T)
         along = np.eye(3) - points[:, :, None] * points[:, None]
         errors.append(np.sqrt(np.mean(np.sum(((found - linear) @ along) ** 2, axis=(1, 2)))))
         across = np.einsum("nab,nb->na", found, points)
@@ -74,7 +74,7 @@ def test_gradients_of_a_sheet_rolled_up_are_its_turns():
     points = np.random.default_rng(1).random((3000, 3)) * [2.0, 1.0, 0.0]
     angle = points[:, 0]
     rolled = np.column_stack([np.sin(angle), points[:, 1], 1.0 - np.cos(angle)])
-    found = core.deformation_gradients(core.build_laplacian(points), rolled)
+    found = core.deform.deformation_gradients(core.build_laplacian(points), rolled)
     wanted = Rotation.from_rotvec(-angle[:, None] * [0.0, 1.0, 0.0]).as_matrix()
     assert np.median(np.abs(found - wanted).max(axis=(1, 2))) < 0.01
     assert np.quantile(np.abs(found - wanted).max(axis=(1, 2)), 0.99) < 0.05
@@ -92,7 +92,7 @@ def test_points_of_no_surface_go_with_the_point_next_to_them(count, aware):
     assert (laplacian.component[-3:] < 0).all()
     z = laplacian.points[:, 2]
     own = np.arange(2003) < 2000
-    kind = core.Deformer if count is None else functools.partial(core.coarse_deformer, count=count)
+    kind = core.deform.Deformer if count is None else functools.partial(core.deform.coarse_deformer, count=count)
     deformer = kind(laplacian, (z > 0.7) & own, rotation_aware=aware)
     turn = TURN if aware else np.eye(3)
     found = deformer.solve(laplacian.points[deformer.handles] @ turn.T + [1.0, 2.0, 3.0])
@@ -104,7 +104,7 @@ def test_points_of_no_surface_go_with_the_point_next_to_them(count, aware):
 def test_points_of_no_surface_stay_with_a_surface_that_stays():
     points = np.concatenate([fibonacci_sphere(800), fibonacci_sphere(800) + [5.0, 0, 0], [[5.0, 0, 2.0], [0, 0, 2.0]]])
     laplacian = core.build_laplacian(points)
-    deformer = core.Deformer(laplacian, np.arange(100))
+    deformer = core.deform.Deformer(laplacian, np.arange(100))
     moved = deformer.solve(points[:100] + [0.0, 1.0, 0.0])
     np.testing.assert_allclose(moved[-2], points[-2])
     np.testing.assert_allclose(moved[-1], points[-1] + [0.0, 1.0, 0.0], atol=1e-9)
@@ -115,7 +115,7 @@ def test_rigid_handles_turn_covariances_and_harmonics(count):
     splats, deformer = bound_bar()
     points, handles = deformer.points, np.concatenate([deformer.handles, deformer.anchors])
     laplacian = core.build_laplacian(points)
-    kind = core.Deformer if count is None else functools.partial(core.coarse_deformer, count=count)
+    kind = core.deform.Deformer if count is None else functools.partial(core.deform.coarse_deformer, count=count)
     free = kind(laplacian, handles)
     moved = free.solve(points[free.handles] @ TURN.T + [1.0, 2.0, 3.0])
     found = splats.deformed(moved, free.gradients(moved))
@@ -188,7 +188,10 @@ def test_a_bent_bar_is_drawn_without_holes():
     opaque = {"colors": np.full((len(before), 3), -2.0), "harmonics": np.zeros((len(before), 0, 3))}
     pictures = [
         render(
-            core.Splats(each.positions, each.scales, each.rotations, np.ones(len(each)), **opaque), FRONT, middle, 5.0
+            core.splats.Splats(each.positions, each.scales, each.rotations, np.ones(len(each)), **opaque),
+            FRONT,
+            middle,
+            5.0,
         )
         for each, middle in ((before, [2.0, 0.0, 0.0]), (after, [1.3, 0.0, 1.3]))
     ]

@@ -18,7 +18,7 @@ NOISE = np.random.default_rng(0).bytes(1_000_000)
 
 def read_as_trained(tmp_path, columns):
     splat_files.write_ply(tmp_path / "trained.ply", columns)
-    return core.read_splats(tmp_path / "trained.ply")
+    return core.splats.read_splats(tmp_path / "trained.ply")
 
 
 def without(columns, *names):
@@ -41,7 +41,7 @@ class TestLayouts:
         columns = splat_files.some_columns()
         splat_files.write_ply(tmp_path / "flat.ply", without(columns, "scale_2"))
         assert holds_splats(tmp_path / "flat.ply")
-        found, wanted = core.read_splats(tmp_path / "flat.ply"), read_as_trained(tmp_path, columns)
+        found, wanted = core.splats.read_splats(tmp_path / "flat.ply"), read_as_trained(tmp_path, columns)
         np.testing.assert_array_equal(found.scales[:, :2], wanted.scales[:, :2])
         np.testing.assert_allclose(found.scales[:, 2], 1e-3 * found.scales[:, :2].min(axis=1), rtol=1e-5)
         np.testing.assert_array_equal(found.rotations, wanted.rotations)
@@ -54,33 +54,33 @@ class TestLayouts:
         values = np.random.default_rng(1).integers(0, 256, (300, 3)) / 255.0
         columns |= {name: (full * part).round(4).astype(kind) for name, part in zip(names, values.T, strict=True)}
         splat_files.write_ply(tmp_path / "rgb.ply", columns)
-        found = core.read_splats(tmp_path / "rgb.ply")
+        found = core.splats.read_splats(tmp_path / "rgb.ply")
         np.testing.assert_allclose(0.5 + splat_files.CONSTANT * found.colors, values, atol=1e-4)
         assert found.harmonics.shape[1] == 0
         assert f"colors by {' '.join(names)}" in found.notices[0]
-        core.write_splats(tmp_path / "again.ply", found)
-        again = core.read_splats(tmp_path / "again.ply")
+        core.splats.write_splats(tmp_path / "again.ply", found)
+        again = core.splats.read_splats(tmp_path / "again.ply")
         np.testing.assert_array_equal(again.colors, found.colors)
         assert again.notices == []
 
     def test_without_rotations_ellipsoids_lie_along_the_axes(self, tmp_path):
         columns = without(splat_files.some_columns(), "rot_0", "rot_1", "rot_2", "rot_3")
         splat_files.write_ply(tmp_path / "straight.ply", columns)
-        found = core.read_splats(tmp_path / "straight.ply")
+        found = core.splats.read_splats(tmp_path / "straight.ply")
         np.testing.assert_array_equal(found.rotations, np.tile([1.0, 0.0, 0.0, 0.0], (300, 1)))
         assert "no rotations" in found.notices[0]
 
     def test_one_scale_is_that_of_balls(self, tmp_path):
         columns = without(splat_files.some_columns(), "scale_1", "scale_2")
         splat_files.write_ply(tmp_path / "balls.ply", columns)
-        found = core.read_splats(tmp_path / "balls.ply")
+        found = core.splats.read_splats(tmp_path / "balls.ply")
         np.testing.assert_array_equal(found.scales, np.repeat(found.scales[:, :1], 3, axis=1))
         assert "balls" in found.notices[0]
 
     def test_what_else_is_missing_is_guessed_and_told(self, tmp_path):
         columns = without(splat_files.some_columns(), "opacity", "f_dc_0", "f_dc_1", "f_dc_2")
         splat_files.write_ply(tmp_path / "bare.ply", columns)
-        found = core.read_splats(tmp_path / "bare.ply")
+        found = core.splats.read_splats(tmp_path / "bare.ply")
         np.testing.assert_allclose(found.opacities, 1.0)
         np.testing.assert_array_equal(found.colors, 0.0)
         assert "no colors" in found.notices[0]
@@ -97,7 +97,7 @@ class TestLayouts:
         wanted = f"less.ply looks like Gaussian splats, but has no {', '.join(missing)}: read as plain points."
         assert found.notices == [wanted]
         with pytest.raises(core.InvalidPointsError, match=f"has no {', '.join(missing)} among its properties"):
-            core.read_splats(tmp_path / "less.ply")
+            core.splats.read_splats(tmp_path / "less.ply")
 
     def test_points_with_an_opacity_are_no_splats(self, tmp_path):
         columns = {name: np.arange(5.0, dtype=np.float32) for name in ("x", "y", "z", "opacity", "scale")}
@@ -107,8 +107,8 @@ class TestLayouts:
     def test_what_was_completed_comes_back_as_trainers_write_it(self, tmp_path):
         given = without(splat_files.some_columns(harmonics=3), "scale_2")
         splat_files.write_ply(tmp_path / "flat.ply", given)
-        core.write_splats(tmp_path / "again.ply", core.read_splats(tmp_path / "flat.ply"))
-        found = core.read_splats(tmp_path / "again.ply")
+        core.splats.write_splats(tmp_path / "again.ply", core.splats.read_splats(tmp_path / "flat.ply"))
+        found = core.splats.read_splats(tmp_path / "again.ply")
         assert found.notices == []
         for name, values in given.items():
             np.testing.assert_array_equal(found.file.columns[name], values)
@@ -120,7 +120,7 @@ class TestPacked:
         columns = splat_files.some_columns()
         (tmp_path / name).write_bytes(splat_files.make_splat(columns))
         assert holds_splats(tmp_path / name)
-        found, wanted = core.read_splats(tmp_path / name), read_as_trained(tmp_path, columns)
+        found, wanted = core.splats.read_splats(tmp_path / name), read_as_trained(tmp_path, columns)
         close(found, wanted, 0.0, 1e-6, 0.02, 0.002, 0.0071, 0.0)
 
     @pytest.mark.parametrize("version", [1, 2, 3])
@@ -129,7 +129,7 @@ class TestPacked:
         columns = splat_files.some_columns(200, harmonics)
         (tmp_path / "a.spz").write_bytes(splat_files.make_spz(columns, version))
         assert holds_splats(tmp_path / "a.spz")
-        found, wanted = core.read_splats(tmp_path / "a.spz"), read_as_trained(tmp_path, columns)
+        found, wanted = core.splats.read_splats(tmp_path / "a.spz"), read_as_trained(tmp_path, columns)
         place, turn = 2e-3 if version == 1 else 2**-12, 0.002 if version == 3 else 0.12
         close(found, wanted, place, 1 / 31.9, turn, 0.002, 0.0131, 1 / 255)
         assert found.notices == []
@@ -137,7 +137,7 @@ class TestPacked:
     def test_spz_of_other_fractions_unpacked_and_with_additions(self, tmp_path):
         columns = splat_files.some_columns(50)
         (tmp_path / "b.spz").write_bytes(splat_files.make_spz(columns, fraction=18, flags=2, pack=bytes) + b"more")
-        found, wanted = core.read_splats(tmp_path / "b.spz"), read_as_trained(tmp_path, columns)
+        found, wanted = core.splats.read_splats(tmp_path / "b.spz"), read_as_trained(tmp_path, columns)
         np.testing.assert_allclose(found.positions, wanted.positions, atol=2**-18)
         assert "ignored vendor extensions" in found.notices[0]
 
@@ -147,23 +147,23 @@ class TestPacked:
         columns = splat_files.some_columns(300, harmonics)
         (tmp_path / "a.ply").write_bytes(splat_files.make_packed(columns, with_colors))
         assert holds_splats(tmp_path / "a.ply")
-        found, wanted = core.read_splats(tmp_path / "a.ply"), read_as_trained(tmp_path, columns)
+        found, wanted = core.splats.read_splats(tmp_path / "a.ply"), read_as_trained(tmp_path, columns)
         close(found, wanted, 6.0 / 2000, 7.0 / 2000, 0.004, 0.002, 0.0075, 8 / 500)
 
     @pytest.mark.parametrize("make", [splat_files.make_spz, splat_files.make_packed, splat_files.make_splat])
     def test_they_are_written_in_the_layout_of_trainers(self, tmp_path, make):
         name = "a.splat" if make is splat_files.make_splat else "a.ply"  # what is in it decides, not the name
         (tmp_path / name).write_bytes(make(splat_files.some_columns(40)))
-        found = core.read_splats(tmp_path / name)
-        core.write_splats(tmp_path / "again.ply", found)
-        again = core.read_splats(tmp_path / "again.ply")
+        found = core.splats.read_splats(tmp_path / name)
+        core.splats.write_splats(tmp_path / "again.ply", found)
+        again = core.splats.read_splats(tmp_path / "again.ply")
         for part in ("positions", "scales", "rotations", "opacities", "colors", "harmonics"):
             np.testing.assert_array_equal(getattr(again, part), getattr(found, part))
         assert set(again.file.columns) == set(splat_files.PROPERTIES)
 
     def test_a_ply_with_the_name_of_another_kind(self, tmp_path):
         splat_files.write_ply(tmp_path / "a.splat", splat_files.some_columns(20))
-        assert len(core.read_splats(tmp_path / "a.splat")) == 20
+        assert len(core.splats.read_splats(tmp_path / "a.splat")) == 20
 
 
 class TestNotFinite:
@@ -177,8 +177,8 @@ class TestNotFinite:
         assert len(found) == 12
         assert found.notices == ["trained.ply: left out 8 splats with numbers that are not finite (NaN or infinity)."]
         np.testing.assert_array_equal(found.file.columns["x"], columns["x"][8:])
-        core.write_splats(tmp_path / "again.ply", found)
-        assert len(core.read_splats(tmp_path / "again.ply")) == 12
+        core.splats.write_splats(tmp_path / "again.ply", found)
+        assert len(core.splats.read_splats(tmp_path / "again.ply")) == 12
 
     def test_harmonics_without_a_number_and_places_far_out_are_left_out_too(self, tmp_path):
         columns = splat_files.some_columns(20)
@@ -200,7 +200,7 @@ class TestNotFinite:
         columns = splat_files.some_columns(5)
         columns["z"][2] = np.nan
         (tmp_path / "a.splat").write_bytes(splat_files.make_splat(columns))
-        assert len(core.read_splats(tmp_path / "a.splat")) == 4
+        assert len(core.splats.read_splats(tmp_path / "a.splat")) == 4
 
 
 class TestLengths:
@@ -211,14 +211,14 @@ class TestLengths:
         maps = np.tile(2.0 * np.eye(3), (30, 1, 1))
         maps[7] = np.diag([1.0, 2.0, 4.0])
         maps[8] = np.eye(3)[[1, 0, 2]]
-        core.write_splats(tmp_path / "big.ply", splats.deformed(splats.positions, maps))
-        found = core.read_splats(tmp_path / "big.ply").file.columns["filter_3D"]
+        core.splats.write_splats(tmp_path / "big.ply", splats.deformed(splats.positions, maps))
+        found = core.splats.read_splats(tmp_path / "big.ply").file.columns["filter_3D"]
         np.testing.assert_allclose(np.delete(found, 8), 0.5, rtol=1e-6)
         assert found[8] == np.float32(0.25)
 
 
 def test_far_away_places_are_written_in_double_precision(tmp_path):
-    splats = core.Splats(
+    splats = core.splats.Splats(
         positions=np.random.default_rng(0).random((9, 3)) + [437251.0, 5412893.0, 310.0],
         scales=np.ones((9, 3)),
         rotations=np.tile([1.0, 0.0, 0.0, 0.0], (9, 1)),
@@ -226,8 +226,8 @@ def test_far_away_places_are_written_in_double_precision(tmp_path):
         colors=np.zeros((9, 3)),
         harmonics=np.zeros((9, 0, 3)),
     )
-    core.write_splats(tmp_path / "far.ply", splats)
-    np.testing.assert_array_equal(core.read_splats(tmp_path / "far.ply").positions, splats.positions)
+    core.splats.write_splats(tmp_path / "far.ply", splats)
+    np.testing.assert_array_equal(core.splats.read_splats(tmp_path / "far.ply").positions, splats.positions)
 
 
 @pytest.mark.parametrize(("kind", "count"), [(np.float32, 1), (np.float64, 0)])
@@ -242,8 +242,8 @@ def test_wide_steps_of_single_precision_are_told(tmp_path, kind, count):
 def test_more_harmonics_than_the_file_had_are_written(tmp_path):
     splats = read_as_trained(tmp_path, splat_files.some_columns(20, 3))
     more = np.random.default_rng(2).standard_normal((20, 15, 3)).astype(np.float32)
-    core.write_splats(tmp_path / "more.ply", core.Splats(**{**vars(splats), "harmonics": more}))
-    np.testing.assert_array_equal(core.read_splats(tmp_path / "more.ply").harmonics, more)
+    core.splats.write_splats(tmp_path / "more.ply", core.splats.Splats(**{**vars(splats), "harmonics": more}))
+    np.testing.assert_array_equal(core.splats.read_splats(tmp_path / "more.ply").harmonics, more)
 
 
 COLUMNS = splat_files.some_columns(300)
@@ -276,7 +276,7 @@ PACKED = splat_files.make_packed(COLUMNS)
 def test_broken_files(tmp_path, name, data, text):
     (tmp_path / name).write_bytes(data)
     with pytest.raises(core.PointCloudError, match=text) as raised:
-        core.read_splats(tmp_path / name)
+        core.splats.read_splats(tmp_path / name)
     assert str(tmp_path / name) in str(raised.value)
     assert re.search(r"\. [A-Z].*\.$", str(raised.value))
 
@@ -302,7 +302,7 @@ def test_what_is_refused_takes_little_memory(tmp_path, name):
     tracemalloc.start()
     try:
         with pytest.raises(core.PointCloudError):
-            core.read_splats(tmp_path / name)
+            core.splats.read_splats(tmp_path / name)
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
@@ -363,7 +363,7 @@ def test_anchors_are_points(tmp_path):
     assert table.attributes.keys() >= {"f_offset_0", "f_anchor_feat_31", "scale_5"}
     assert "a.ply holds anchors of Scaffold-GS, Octree-GS or the like" in table.notices[-1]
     with pytest.raises(core.PointCloudError, match="holds no Gaussian splats: it has anchors"):
-        core.read_splats(tmp_path / "a.ply")
+        core.splats.read_splats(tmp_path / "a.ply")
 
 
 @pytest.mark.parametrize(
@@ -377,7 +377,7 @@ def test_anchors_are_points(tmp_path):
 )
 def test_splats_that_are_not_all_there_is(tmp_path, names, told):
     write_more(tmp_path / "a.ply", names)
-    splats = core.read_splats(tmp_path / "a.ply")
+    splats = core.splats.read_splats(tmp_path / "a.ply")
     assert [told in notice for notice in splats.notices] == [True] * bool(told)
     assert splats.file.columns.keys() >= set(names)
 

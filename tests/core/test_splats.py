@@ -18,7 +18,7 @@ TURNS = Rotation.random(500, random_state=1)
 
 
 def some_splats(count=500, rest=15):
-    return core.Splats(
+    return core.splats.Splats(
         positions=RNG.standard_normal((count, 3)),
         scales=np.exp(RNG.uniform(-9.0, 0.0, (count, 3))),
         rotations=Rotation.random(count, random_state=2).as_quat(scalar_first=True),
@@ -116,7 +116,7 @@ def test_a_uniform_scale_scales_the_axes_alone():
 
 
 def test_splats_without_a_length_keep_a_rotation():
-    splats = core.Splats([[0, 0, 0]], [[0, 0, 0]], [[1, 0, 0, 0]], [1.0], [[0, 0, 0]], np.zeros((1, 3, 3)))
+    splats = core.splats.Splats([[0, 0, 0]], [[0, 0, 0]], [[1, 0, 0, 0]], [1.0], [[0, 0, 0]], np.zeros((1, 3, 3)))
     moved = splats.deformed([[1, 1, 1]], np.zeros((1, 3, 3)))
     np.testing.assert_array_equal(moved.scales, 0.0)
     np.testing.assert_allclose(np.linalg.norm(moved.rotations), 1.0)
@@ -127,7 +127,7 @@ def test_splats_without_a_length_keep_a_rotation():
 def test_what_is_not_changed_is_written_bit_for_bit(tmp_path, rest, order):
     given, again = tmp_path / "given.ply", tmp_path / "again.ply"
     rows = written_ply(given, rest, order, extra=("confidence",), comments=["comment made by a trainer"])
-    splats = core.read_splats(given)
+    splats = core.splats.read_splats(given)
     assert splats.notices == []
     np.testing.assert_allclose(splats.scales[:, 1], np.exp(rows["scale_1"].astype(float)))
     np.testing.assert_allclose(splats.opacities, 1.0 / (1.0 + np.exp(-rows["opacity"].astype(float))))
@@ -137,19 +137,19 @@ def test_what_is_not_changed_is_written_bit_for_bit(tmp_path, rest, order):
         for number in range(rest // 3):
             wanted = rows[f"f_rest_{channel * rest // 3 + number}"]
             np.testing.assert_array_equal(splats.harmonics[:, number, channel], wanted)
-    core.write_splats(again, splats)
+    core.splats.write_splats(again, splats)
     assert given.read_bytes() == again.read_bytes()
 
 
 def test_only_what_changed_is_written_anew(tmp_path):
     given, again = tmp_path / "given.ply", tmp_path / "again.ply"
     rows = written_ply(given)
-    splats = core.read_splats(given)
+    splats = core.splats.read_splats(given)
     maps = np.tile(np.eye(3), (50, 1, 1))
     maps[7] = Rotation.from_rotvec([0.3, 0.2, 0.1]).as_matrix() * 2.0
     moved = splats.deformed(splats.positions, maps)
-    core.write_splats(again, moved)
-    found = core.read_splats(again)
+    core.splats.write_splats(again, moved)
+    found = core.splats.read_splats(again)
     close_covariances(found.covariances, moved.covariances, 1e-5)
     before, after = (np.array(path.read_bytes()[-rows.nbytes :]) for path in (given, again))
     before, after = (np.frombuffer(each.tobytes(), rows.dtype) for each in (before, after))
@@ -162,8 +162,8 @@ def test_only_what_changed_is_written_anew(tmp_path):
 
 def test_new_splats_are_written_in_the_common_layout(tmp_path):
     splats = some_splats(40, 8)
-    core.write_splats(tmp_path / "new.ply", splats)
-    found = core.read_splats(tmp_path / "new.ply")
+    core.splats.write_splats(tmp_path / "new.ply", splats)
+    found = core.splats.read_splats(tmp_path / "new.ply")
     for name in ("positions", "scales", "opacities", "colors", "harmonics"):
         np.testing.assert_allclose(getattr(found, name), getattr(splats, name), rtol=2e-6, atol=1e-6)
     close_covariances(found.covariances, splats.covariances, 1e-5)
@@ -173,9 +173,13 @@ def test_joined_splats_keep_the_columns_of_all_files(tmp_path):
     """One set is of a big-endian file with a column more, one of a file without harmonics, one of none."""
     written_ply(tmp_path / "a.ply", 24, ">", extra=("confidence",), comments=["comment first"])
     written_ply(tmp_path / "b.ply", 0, count=30)
-    sets = [core.read_splats(tmp_path / "a.ply"), core.read_splats(tmp_path / "b.ply"), some_splats(20, 3)]
-    core.write_splats(tmp_path / "joined.ply", joined(sets))
-    found = core.read_splats(tmp_path / "joined.ply")
+    sets = [
+        core.splats.read_splats(tmp_path / "a.ply"),
+        core.splats.read_splats(tmp_path / "b.ply"),
+        some_splats(20, 3),
+    ]
+    core.splats.write_splats(tmp_path / "joined.ply", joined(sets))
+    found = core.splats.read_splats(tmp_path / "joined.ply")
     np.testing.assert_array_equal(found.positions[:80], np.concatenate([sets[0].positions, sets[1].positions]))
     np.testing.assert_allclose(found.scales, np.concatenate([each.scales for each in sets]), rtol=1e-5)
     np.testing.assert_array_equal(found.harmonics[:50], sets[0].harmonics)
@@ -195,21 +199,21 @@ def test_extreme_numbers_of_a_file_are_read_and_written_again(tmp_path):
     for number in range(4):
         rows[f"rot_{number}"][1] = 0.0
     path.write_bytes(path.read_bytes()[: -rows.nbytes] + rows.tobytes())
-    splats = core.read_splats(path)
+    splats = core.splats.read_splats(path)
     np.testing.assert_allclose(splats.opacities, [1.0, 0.0, 0.5, 1.0, 0.0, 0.5], atol=1e-12)
     np.testing.assert_array_equal(splats.rotations[1], [1, 0, 0, 0])
     assert np.isfinite(splats.scales).all()
-    core.write_splats(tmp_path / "again.ply", splats)
+    core.splats.write_splats(tmp_path / "again.ply", splats)
     assert (tmp_path / "again.ply").read_bytes() == path.read_bytes()
 
 
 @pytest.mark.parametrize(("rest", "used"), [(12, 3), (51, 15), (7, 0), (75, 0)])
 def test_harmonics_of_no_whole_degree_are_left_out_with_a_notice(tmp_path, rest, used):
     written_ply(tmp_path / "odd.ply", rest)
-    splats = core.read_splats(tmp_path / "odd.ply")
+    splats = core.splats.read_splats(tmp_path / "odd.ply")
     assert splats.harmonics.shape[1] == used
     assert "f_rest" in splats.notices[0]
-    core.write_splats(tmp_path / "again.ply", splats)
+    core.splats.write_splats(tmp_path / "again.ply", splats)
     assert (tmp_path / "again.ply").read_bytes() == (tmp_path / "odd.ply").read_bytes()
 
 
@@ -219,32 +223,32 @@ def test_files_that_hold_no_splats_are_refused(tmp_path):
         b"property float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n"
     )
     with pytest.raises(core.InvalidPointsError, match="no Gaussian splats.*opacity"):
-        core.read_splats(tmp_path / "points.ply")
+        core.splats.read_splats(tmp_path / "points.ply")
     with pytest.raises(core.PointCloudError, match="no file"):
-        core.read_splats(tmp_path / "none.ply")
+        core.splats.read_splats(tmp_path / "none.ply")
     with pytest.raises(core.PointCloudError, match=r"\.ply"):
-        core.write_splats(tmp_path / "splats.txt", some_splats(2))
+        core.splats.write_splats(tmp_path / "splats.txt", some_splats(2))
     with pytest.raises(core.PointCloudError, match="no name of a file"):
-        core.read_splats(5)
+        core.splats.read_splats(5)
     with pytest.raises(core.PointCloudError, match="not Splats"):
-        core.write_splats(tmp_path / "splats.ply", [1.0])
+        core.splats.write_splats(tmp_path / "splats.ply", [1.0])
     rows = written_ply(tmp_path / "bad.ply", 0)
     rows["x"][3] = 1e35
     (tmp_path / "bad.ply").write_bytes((tmp_path / "bad.ply").read_bytes()[: -rows.nbytes] + rows.tobytes())
-    assert len(core.read_splats(tmp_path / "bad.ply")) == len(rows) - 1
+    assert len(core.splats.read_splats(tmp_path / "bad.ply")) == len(rows) - 1
     (tmp_path / "short.ply").write_bytes((tmp_path / "bad.ply").read_bytes()[:-9])
     with pytest.raises(core.InvalidPointsError):
-        core.read_splats(tmp_path / "short.ply")
+        core.splats.read_splats(tmp_path / "short.ply")
 
 
 def test_arrays_of_wrong_shapes_are_refused():
     splats = some_splats(10)
     with pytest.raises(core.InvalidPointsError, match="Rotations"):
-        core.Splats(
+        core.splats.Splats(
             splats.positions, splats.scales, np.ones((10, 3)), splats.opacities, splats.colors, splats.harmonics
         )
     with pytest.raises(core.InvalidPointsError, match="harmonics"):
-        core.Splats(
+        core.splats.Splats(
             splats.positions, splats.scales, splats.rotations, splats.opacities, splats.colors, np.ones((10, 7, 3))
         )
     with pytest.raises(core.InvalidPointsError, match="[Gg]radients"):
@@ -266,24 +270,24 @@ def test_floaters_are_found_whatever_the_units_and_the_order():
     opacities[faint], scales[huge] = 0.01, 2.0
     points[apart] *= 1.6
     rotations = quaternions_of(np.moveaxis(frames, 0, 2))
-    splats = core.Splats(points, scales, rotations, opacities, points, np.zeros((2000, 0, 3)))
-    found = core.floaters(splats)
+    splats = core.splats.Splats(points, scales, rotations, opacities, points, np.zeros((2000, 0, 3)))
+    found = core.splats.floaters(splats)
     np.testing.assert_array_equal(np.flatnonzero(found), np.sort(wrong))
     similar = 300.0 * TURNS.as_matrix()[0]
     turned_ones = splats.deformed(points @ similar.T, np.tile(similar, (2000, 1, 1)))
-    np.testing.assert_array_equal(core.floaters(turned_ones), found)
+    np.testing.assert_array_equal(core.splats.floaters(turned_ones), found)
     order = rng.permutation(2000)
     parts = (points[order], scales[order], rotations[order], opacities[order], points[order], np.zeros((2000, 0, 3)))
-    np.testing.assert_array_equal(core.floaters(core.Splats(*parts)), found[order])
+    np.testing.assert_array_equal(core.splats.floaters(core.splats.Splats(*parts)), found[order])
 
 
 def test_floaters_need_splats_with_finite_numbers():
     with pytest.raises(core.InvalidPointsError, match="not Splats"):
-        core.floaters(np.zeros((5, 3)))
+        core.splats.floaters(np.zeros((5, 3)))
     splats = some_splats(20)
     scales = splats.scales.copy()
     scales[3] = np.nan
     splats = replace(splats, scales=scales)
     with pytest.raises(core.InvalidPointsError, match="1 of 20"):
-        core.floaters(splats)
-    assert core.floaters(some_splats(5)).shape == (5,)
+        core.splats.floaters(splats)
+    assert core.splats.floaters(some_splats(5)).shape == (5,)

@@ -50,13 +50,13 @@ CLEAN = {
 @pytest.mark.parametrize("name", CLEAN)
 def test_clean_clouds_lose_nothing(name):
     points = CLEAN[name]()
-    assert np.count_nonzero(core.stray_points(points)) <= 5e-4 * len(points)
+    assert np.count_nonzero(core.clean.stray_points(points)) <= 5e-4 * len(points)
 
 
 @pytest.mark.parametrize("height", [1.5, 3.0, 20.0, 1e4])
 def test_a_lone_point_is_found_at_any_height(height):
     points = np.concatenate([random_sphere(COUNT), [[0.0, 0.0, 1.0 + height * SPACING]]])
-    np.testing.assert_array_equal(np.flatnonzero(core.stray_points(points)), [COUNT])
+    np.testing.assert_array_equal(np.flatnonzero(core.clean.stray_points(points)), [COUNT])
 
 
 @pytest.mark.parametrize("sort", [in_box, near, in_clumps])
@@ -66,7 +66,7 @@ def test_nearly_all_are_found_and_nearly_nothing_else(sort, share):
     extra = sort(torus, share)
     extra = extra[marked(torus, extra)]
     assert len(extra) > 0.6 * share * len(torus)
-    found = core.stray_points(np.concatenate([torus, extra]))
+    found = core.clean.stray_points(np.concatenate([torus, extra]))
     assert found[5000:].mean() >= 0.97
     assert found[:5000].mean() <= 1e-3
 
@@ -77,12 +77,12 @@ def test_many_do_not_vouch_for_each_other():
     extra = near(torus, 0.1)
     both = np.concatenate([torus, extra[marked(torus, extra)]])
     left_out = core.build_laplacian(both).component < 0
-    assert np.count_nonzero(core.stray_points(both)) > 1.05 * np.count_nonzero(left_out)
+    assert np.count_nonzero(core.clean.stray_points(both)) > 1.05 * np.count_nonzero(left_out)
 
 
 def test_a_stricter_choice_holds_the_milder_one():
     points = np.concatenate([noisy_sphere(COUNT, 0.3), in_box(random_sphere(COUNT), 0.1)])
-    strays = core.Strays(points)
+    strays = core.clean.Strays(points)
     chosen = [strays.chosen(strictness) for strictness in (0.1, 0.3, 1.0, 3.0, 10.0)]
     for milder, stricter in pairwise(chosen):
         assert not (milder & ~stricter).any()
@@ -95,7 +95,7 @@ def test_scores_tell_the_height_and_the_distance():
     plane = np.column_stack([x.ravel(), y.ravel(), np.zeros(1600)])
     heights = np.array([1.0, 2.0, 4.0])
     above = np.column_stack([[10.5, 19.5, 29.5], [10.5, 19.5, 29.5], heights])
-    scores = core.Strays(np.concatenate([plane, above])).scores
+    scores = core.clean.Strays(np.concatenate([plane, above])).scores
     near = np.sort(np.linalg.norm(plane[None] - above[:, None], axis=2), axis=1)
     heights = np.minimum(heights / (0.4 * near[:, 11] * np.sqrt(np.pi / 12.0)), 4.0)
     around = np.sort(np.linalg.norm(plane - [10.0, 10.0, 0.0], axis=1))[12] * np.sqrt(np.pi / 12.0)
@@ -105,7 +105,7 @@ def test_scores_tell_the_height_and_the_distance():
 
 def test_parts_have_their_points_and_areas():
     ball, bead = random_sphere(3000), 0.2 * fibonacci_sphere(120) + [3.0, 0.0, 0.0]
-    strays = core.Strays(np.concatenate([ball, bead, [[0.0, 3.0, 0.0]]]))
+    strays = core.clean.Strays(np.concatenate([ball, bead, [[0.0, 3.0, 0.0]]]))
     np.testing.assert_array_equal(strays.part_counts, [3000] * 3000 + [120] * 120 + [0])
     np.testing.assert_allclose(strays.part_areas[[0, 3000, 3120]], [4.0 * np.pi, 0.16 * np.pi, 0.0], rtol=0.1)
 
@@ -122,7 +122,7 @@ def test_small_parts_are_taken_below_a_number_or_an_area():
         ({"smallest_area": 0.7}, bead),
         ({"smallest": 10**9, "smallest_area": 1e9}, bead),  # never the largest
     ):
-        np.testing.assert_array_equal(core.stray_points(points, **settings), found)
+        np.testing.assert_array_equal(core.clean.stray_points(points, **settings), found)
 
 
 @pytest.mark.parametrize(("count", "taken"), [(40, True), (400, False)])
@@ -130,31 +130,31 @@ def test_sparser_parts_need_more_points(count, taken):
     """Forty points five spacings apart may be chance, four hundred are not."""
     wall = square_random(count) * np.sqrt(count) * 5.0 * SPACING
     points = np.concatenate([random_sphere(COUNT), np.roll(wall, 1, axis=1) + [3.0, 0.0, 0.0]])
-    assert np.all(core.stray_points(points)[COUNT:] == taken)
+    assert np.all(core.clean.stray_points(points)[COUNT:] == taken)
 
 
 def test_a_floating_clump_is_taken_unless_parts_may_have_any_size():
     clump = [0.0, 0.0, 2.0] + 0.3 * SPACING * np.random.default_rng(3).normal(size=(20, 3))
     points = np.concatenate([random_sphere(COUNT), clump])
-    assert core.stray_points(points)[COUNT:].all()
-    assert not core.stray_points(points, smallest=0)[COUNT:].all()
+    assert core.clean.stray_points(points)[COUNT:].all()
+    assert not core.clean.stray_points(points, smallest=0)[COUNT:].all()
 
 
 def test_nothing_depends_on_place_size_turn_or_order():
     points = np.concatenate([noisy_sphere(COUNT, 0.2), near(random_sphere(COUNT), 0.1)])
-    found = core.stray_points(points)
+    found = core.clean.stray_points(points)
     order = np.random.default_rng(0).permutation(len(points))
     turn = np.array([[0.6, 0.0, 0.8], [0.0, 1.0, 0.0], [-0.8, 0.0, 0.6]])
-    np.testing.assert_array_equal(core.stray_points(points[order]), found[order])
-    np.testing.assert_array_equal(core.stray_points(1e-5 * points + [1.0, 2.0, 3.0]), found)
-    np.testing.assert_array_equal(core.stray_points(points @ turn.T), found)
+    np.testing.assert_array_equal(core.clean.stray_points(points[order]), found[order])
+    np.testing.assert_array_equal(core.clean.stray_points(1e-5 * points + [1.0, 2.0, 3.0]), found)
+    np.testing.assert_array_equal(core.clean.stray_points(points @ turn.T), found)
 
 
 def test_copies_of_a_point_are_taken_together():
     points = np.concatenate([random_sphere(COUNT), [[0.0, 0.0, 2.0]] * 3])
-    np.testing.assert_array_equal(np.flatnonzero(core.stray_points(points)), [COUNT, COUNT + 1, COUNT + 2])
+    np.testing.assert_array_equal(np.flatnonzero(core.clean.stray_points(points)), [COUNT, COUNT + 1, COUNT + 2])
     twice = np.repeat(random_sphere(COUNT), 2, axis=0)
-    assert core.Strays(twice).part_counts[0] == 2 * COUNT
+    assert core.clean.Strays(twice).part_counts[0] == 2 * COUNT
 
 
 @pytest.mark.parametrize(
@@ -169,16 +169,16 @@ def test_copies_of_a_point_are_taken_together():
 )
 def test_settings_without_sense_are_refused(settings, text):
     with pytest.raises(core.PointCloudError, match=text):
-        core.stray_points(random_sphere(100), **settings)
+        core.clean.stray_points(random_sphere(100), **settings)
 
 
 def test_the_work_can_be_stopped_at_each_stage():
     stages = []
-    core.stray_points(random_sphere(200), progress=lambda stage, share: stages.append((stage, share)))
+    core.clean.stray_points(random_sphere(200), progress=lambda stage, share: stages.append((stage, share)))
     assert [share for _, share in stages] == sorted(share for _, share in stages)
     for last in dict(stages):
         with pytest.raises(core.Cancelled):
-            core.stray_points(random_sphere(200), progress=stopping(last))
+            core.clean.stray_points(random_sphere(200), progress=stopping(last))
 
 
 def stopping(last):

@@ -19,17 +19,17 @@ def sphere():
 
 @pytest.fixture(scope="module")
 def subset(sphere):
-    return core.blue_noise_subset(sphere, 3000)
+    return core.clean.blue_noise_subset(sphere, 3000)
 
 
 @pytest.fixture(scope="module")
 def prolongation(sphere, subset):
-    return core.Prolongation(sphere, subset, sphere[subset])
+    return core.clean.Prolongation(sphere, subset, sphere[subset])
 
 
 @pytest.mark.parametrize("count", [100, 3000, 15000])
 def test_as_many_as_wanted_nearly(sphere, count):
-    chosen = core.blue_noise_subset(sphere, count)
+    chosen = core.clean.blue_noise_subset(sphere, count)
     assert 0.9 * count <= len(chosen) <= count
     assert np.all(np.diff(chosen) > 0)
 
@@ -45,7 +45,7 @@ def test_no_point_is_close_to_another_and_none_is_far_from_all(sphere, subset):
 def test_density_is_evened_out():
     points = torus_points(30000)
     points = np.concatenate([points, points[points[:, 0] > 0.0] * (1.0 + 1e-4), points[points[:, 0] > 0.0]])
-    chosen = points[core.blue_noise_subset(points, 2000)]
+    chosen = points[core.clean.blue_noise_subset(points, 2000)]
     assert np.mean(chosen[:, 0] > 0.0) == pytest.approx(0.5, abs=0.03)
 
 
@@ -53,7 +53,7 @@ def test_density_is_evened_out():
 def test_rounded_coordinates_leave_as_many(count):
     """Distances between them jump, so that one radius leaves far too few, and any smaller one too many."""
     points = np.round(torus_points(60000), 2)
-    chosen = points[core.blue_noise_subset(points, count)]
+    chosen = points[core.clean.blue_noise_subset(points, count)]
     assert 0.9 * count <= len(chosen) <= count
     spacing = spacing_of(count, np.pi**2 * 1.6)
     assert cKDTree(chosen).query(chosen, k=2)[0][:, 1].min() > 0.6 * spacing
@@ -62,33 +62,33 @@ def test_rounded_coordinates_leave_as_many(count):
 
 def test_order_makes_no_difference(sphere, subset):
     order = np.random.default_rng(1).permutation(len(sphere))
-    again = core.blue_noise_subset(sphere[order], 3000)
+    again = core.clean.blue_noise_subset(sphere[order], 3000)
     assert set(order[again]) == set(subset)
 
 
 def test_of_duplicates_one_at_most(sphere, subset):
     double = np.concatenate([sphere, sphere])
-    chosen = core.blue_noise_subset(double, 3000)
+    chosen = core.clean.blue_noise_subset(double, 3000)
     assert {*map(tuple, double[chosen])} == {*map(tuple, sphere[subset])}
-    assert len(core.blue_noise_subset(np.repeat(sphere[:100], 5, axis=0), 400)) == 100
-    assert len(core.blue_noise_subset(np.ones((10, 3), dtype=int), 4)) == 1
+    assert len(core.clean.blue_noise_subset(np.repeat(sphere[:100], 5, axis=0), 400)) == 100
+    assert len(core.clean.blue_noise_subset(np.ones((10, 3), dtype=int), 4)) == 1
 
 
 def test_few_points_are_all_taken(sphere):
-    assert np.array_equal(core.blue_noise_subset(sphere[:500], 500), np.arange(500))
+    assert np.array_equal(core.clean.blue_noise_subset(sphere[:500], 500), np.arange(500))
 
 
 def test_clusters_far_apart():
     """Nearly all points in a tenth of a thousandth of the extent."""
     points = np.concatenate([1e-4 * random_sphere(5000), random_sphere(500, 1) + 10.0])
-    chosen = core.blue_noise_subset(points, 400)
+    chosen = core.clean.blue_noise_subset(points, 400)
     assert 0 < len(chosen) <= 400
 
 
 @pytest.mark.parametrize("count", [0, -3, 2.5])
 def test_a_count_that_is_none_is_refused(sphere, count):
     with pytest.raises(core.InvalidPointsError, match="whole number of at least 1"):
-        core.blue_noise_subset(sphere, count)
+        core.clean.blue_noise_subset(sphere, count)
 
 
 def test_areas_keep_their_total(sphere, subset, prolongation):
@@ -121,18 +121,20 @@ def test_functions_are_carried_to_second_order(sphere, subset, prolongation):
 def test_the_error_falls_with_the_square_of_the_spacing(sphere):
     errors = []
     for count in (500, 2000):
-        chosen = core.blue_noise_subset(sphere, count)
-        carried = core.Prolongation(sphere, chosen, sphere[chosen]).interpolate(sphere[chosen])
+        chosen = core.clean.blue_noise_subset(sphere, count)
+        carried = core.clean.Prolongation(sphere, chosen, sphere[chosen]).interpolate(sphere[chosen])
         errors.append(np.sqrt(np.mean((carried - sphere) ** 2)))
     assert errors[0] / errors[1] > 3.5
 
 
 def test_linear_functions_of_a_plane_stay_linear():
     points = np.random.default_rng(0).uniform(size=(5000, 3)) * [1.0, 1.0, 0.0]
-    chosen = core.blue_noise_subset(points, 600)
+    chosen = core.clean.blue_noise_subset(points, 600)
     values = 3.0 * points[:, 0] - points[:, 1]
     inside = np.all(np.abs(points[:, :2] - 0.5) < 0.45, axis=1)
-    carried = core.Prolongation(points, chosen, np.tile([0.0, 0.0, 1.0], (len(chosen), 1))).interpolate(values[chosen])
+    carried = core.clean.Prolongation(points, chosen, np.tile([0.0, 0.0, 1.0], (len(chosen), 1))).interpolate(
+        values[chosen]
+    )
     assert np.abs(carried - values)[inside].max() < 0.02 * spacing_of(600, 1.0)
     assert np.abs(carried - values).max() < 0.5 * spacing_of(600, 1.0)
 
@@ -143,9 +145,9 @@ def test_close_sheets_stay_apart():
     upper = np.arange(20000) % 2 == 0
     spacing = spacing_of(1000, 1.0)
     points = np.column_stack([side, np.where(upper, spacing / 3.0, 0.0)])
-    chosen = core.blue_noise_subset(points, 2000)
+    chosen = core.clean.blue_noise_subset(points, 2000)
     normals = np.where(upper[chosen, None], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0])
-    every = core.Prolongation(points, chosen, normals)
+    every = core.clean.Prolongation(points, chosen, normals)
     assert np.mean(every.labels(upper[chosen]) == upper) > 0.98
     assert np.mean(np.abs(every.interpolate(upper[chosen].astype(float)) - upper) < 1e-6) > 0.98
 
@@ -159,24 +161,24 @@ def test_columns_and_labels(sphere, subset, prolongation):
 
 def test_components_are_kept_apart():
     points = np.random.default_rng(0).uniform(size=(4000, 3)) * [1.0, 1.0, 0.0]
-    chosen = core.blue_noise_subset(points, 500)
+    chosen = core.clean.blue_noise_subset(points, 500)
     right = points[chosen, 0] > 0.5
     normals = np.tile([0.0, 0.0, 1.0], (len(chosen), 1))
-    carried = core.Prolongation(points, chosen, normals, right.astype(int)).interpolate(right.astype(float))
+    carried = core.clean.Prolongation(points, chosen, normals, right.astype(int)).interpolate(right.astype(float))
     assert set(np.unique(carried.round(5))) == {0.0, 1.0}
 
 
 @pytest.mark.parametrize("rows", [[], [7, 20000], [[1, 2]], [0.5]])
 def test_no_subset_is_refused(sphere, rows):
     with pytest.raises(core.InvalidPointsError, match="A subset has the shape"):
-        core.Prolongation(sphere, rows, np.ones((len(rows), 3)))
+        core.clean.Prolongation(sphere, rows, np.ones((len(rows), 3)))
 
 
 def test_normals_of_another_number_are_refused(sphere, subset):
     with pytest.raises(core.InvalidPointsError):
-        core.Prolongation(sphere, subset, sphere)
+        core.clean.Prolongation(sphere, subset, sphere)
 
 
 def test_a_subset_of_one_gives_its_value_to_all(sphere):
-    single = core.Prolongation(sphere[:50], [7], sphere[7:8])
+    single = core.clean.Prolongation(sphere[:50], [7], sphere[7:8])
     np.testing.assert_array_equal(single.interpolate([3.0]), np.full(50, 3.0, dtype=np.float32))

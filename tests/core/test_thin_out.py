@@ -29,7 +29,7 @@ def roof(across=40):
 @pytest.mark.parametrize("keep_edges", [True, False])
 def test_none_are_nearer_than_the_spacing_and_none_farther(name, spacing, keep_edges):
     points = CLOUDS[name]()
-    chosen = core.thin_out(points, spacing=spacing, keep_edges=keep_edges)
+    chosen = core.clean.thin_out(points, spacing=spacing, keep_edges=keep_edges)
     assert np.all(np.diff(chosen) > 0)
     tree = cKDTree(points[chosen])
     assert len(tree.query_pairs(spacing * (1.0 - 1e-12))) == 0
@@ -40,16 +40,16 @@ def test_none_are_nearer_than_the_spacing_and_none_farther(name, spacing, keep_e
 @pytest.mark.parametrize("count", [1, 50, 900])
 def test_a_count_is_the_most(name, count):
     points = CLOUDS[name]()
-    chosen = core.thin_out(points, count=count)
+    chosen = core.clean.thin_out(points, count=count)
     assert 0.9 * count <= len(chosen) <= count
     assert len(np.unique(points[chosen], axis=0)) == len(chosen)
 
 
 def test_enough_stay_all_without_copies():
     points = CLOUDS["copies"]()
-    assert len(core.thin_out(points, count=100)) == 100
-    assert len(np.unique(points[core.thin_out(points, count=10**6)], axis=0)) == 100
-    assert len(core.thin_out(np.zeros((50, 3)), count=7)) == 1
+    assert len(core.clean.thin_out(points, count=100)) == 100
+    assert len(np.unique(points[core.clean.thin_out(points, count=10**6)], axis=0)) == 100
+    assert len(core.clean.thin_out(np.zeros((50, 3)), count=7)) == 1
 
 
 def test_edges_come_first():
@@ -57,7 +57,7 @@ def test_edges_come_first():
     points, ridge = roof()
     gaps = []
     for keep_edges in (True, False):
-        chosen = core.thin_out(points, spacing=0.12, keep_edges=keep_edges)
+        chosen = core.clean.thin_out(points, spacing=0.12, keep_edges=keep_edges)
         gaps.append(cKDTree(points[chosen[ridge[chosen]]]).query(points[ridge])[0])
     (edges, anyway) = gaps
     assert edges.max() < 0.15 < 0.25 < anyway.max()
@@ -68,13 +68,15 @@ def test_nothing_depends_on_the_order():
     points = random_sphere(2000)
     order = np.random.default_rng(1).permutation(2000)
     for settings in ({"count": 300}, {"spacing": 0.2}):
-        chosen = core.thin_out(points, **settings)
-        np.testing.assert_array_equal(np.sort(order[core.thin_out(points[order], **settings)]), chosen)
+        chosen = core.clean.thin_out(points, **settings)
+        np.testing.assert_array_equal(np.sort(order[core.clean.thin_out(points[order], **settings)]), chosen)
 
 
 def test_lengths_scale():
     points = random_sphere(2000)
-    np.testing.assert_array_equal(core.thin_out(8.0 * points, spacing=1.6), core.thin_out(points, spacing=0.2))
+    np.testing.assert_array_equal(
+        core.clean.thin_out(8.0 * points, spacing=1.6), core.clean.thin_out(points, spacing=0.2)
+    )
 
 
 @pytest.mark.parametrize(
@@ -91,7 +93,7 @@ def test_lengths_scale():
 )
 def test_settings_without_sense_are_refused(settings, text):
     with pytest.raises(core.PointCloudError, match=text):
-        core.thin_out(random_sphere(100), **settings)
+        core.clean.thin_out(random_sphere(100), **settings)
 
 
 def test_the_work_can_be_stopped():
@@ -100,7 +102,7 @@ def test_the_work_can_be_stopped():
             raise core.Cancelled
 
     with pytest.raises(core.Cancelled):
-        core.thin_out(random_sphere(500), count=100, progress=progress)
+        core.clean.thin_out(random_sphere(500), count=100, progress=progress)
 
 
 def _grid(size, spacing=1.0):
@@ -124,15 +126,15 @@ def _grid(size, spacing=1.0):
 def test_as_many_as_were_asked_for_are_chosen(points, share):
     different = len(np.unique(points, axis=0))
     count = int(share * different)
-    chosen = core.thin_out(points, count=count)
+    chosen = core.clean.thin_out(points, count=count)
     assert len(chosen) == count
     assert len(np.unique(points[chosen], axis=0)) == count
-    assert 0.9 * count <= len(core.blue_noise_subset(points, count)) <= count
+    assert 0.9 * count <= len(core.clean.blue_noise_subset(points, count)) <= count
 
 
 def test_points_beyond_one_distance_are_somewhat_nearer():
     """Of random points by far most are as far apart as the discs let them, the last ones not much nearer."""
     points = np.column_stack([np.random.default_rng(1).random((6000, 2)), np.zeros(6000)])
-    chosen = points[core.thin_out(points, count=1000)]
+    chosen = points[core.clean.thin_out(points, count=1000)]
     apart = np.sort(cKDTree(chosen).query(chosen, k=2)[0][:, 1])
     assert apart[0] > 0.6 * apart[100]

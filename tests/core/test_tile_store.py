@@ -75,7 +75,7 @@ class TestStore:
         assert measured.count == 4
         for name in ("normals", "areas", "smoothing_lengths", "gaussian_curvature", "trust", "surface_points"):
             same(joined(measured, name), getattr(laplacian, name))
-        same(joined(measured, "mean_curvature"), core.mean_curvature(laplacian))
+        same(joined(measured, "mean_curvature"), core.measure.mean_curvature(laplacian))
         np.testing.assert_array_equal(joined(measured, "boundary"), laplacian.boundary)
         np.testing.assert_array_equal(joined(measured, "component"), laplacian.component)
         assert abs(joined(measured, "areas").sum() / laplacian.areas.sum() - 1.0) < 1e-9
@@ -102,7 +102,7 @@ class TestStore:
     def test_gives_the_roughness_of_the_whole(self, measured):
         length = float(np.median(whole().smoothing_lengths))
         assert abs(measured.record["wavelength"] / (9.0 * length) - 1.0) < 1e-9
-        same(joined(measured, core.tiles.ROUGHNESS), core.roughness(whole()), 1e-6)
+        same(joined(measured, core.tiles.ROUGHNESS), core.clean.roughness(whole()), 1e-6)
         assert core.tiles.doubted_wavelength(measured.record, core.tiles.HALO) is None
         longer = {**measured.record, "wavelength": np.array(40.0 * length)}
         wavelength, share = core.tiles.doubted_wavelength(longer, core.tiles.HALO)
@@ -278,7 +278,7 @@ def test_modes_are_carried_from_evenly_spread_points_to_all(tmp_path):
     np.testing.assert_allclose(values, [0.0, 2.0, 2.0, 2.0], atol=0.02)
     source, normals, vectors = (next(store.told("spectrum", name)) for name in ("points", "normals", "vectors"))
     assert len(source) <= 700
-    every = core.Prolongation(np.concatenate([source, points]), np.arange(len(source)), normals)
+    every = core.clean.Prolongation(np.concatenate([source, points]), np.arange(len(source)), normals)
     found = np.concatenate([store.read("modes", number, "modes") for number in range(2)])
     own = np.concatenate([store.own(number) for number in range(2)])
     order = np.lexsort(points.T)

@@ -67,7 +67,7 @@ def assert_alike(store, laplacian, rtol):
     on = laplacian.component >= 0
     for name in ("normals", "quadric_mean_curvature", "gaussian_curvature", "smoothing_lengths", "areas", "trust"):
         same(in_order(store, name)[on], getattr(laplacian, name)[on], rtol)
-    same(in_order(store, "mean_curvature")[on], core.mean_curvature(laplacian)[on], rtol)
+    same(in_order(store, "mean_curvature")[on], core.measure.mean_curvature(laplacian)[on], rtol)
     for name in ("boundary", "component", "doubt"):
         np.testing.assert_array_equal(in_order(store, name), getattr(laplacian, name))
     assert abs(in_order(store, "areas").sum() / laplacian.areas.sum() - 1.0) < 1e-9
@@ -233,7 +233,7 @@ def test_one_smoothing_length_is_that_of_the_whole(tmp_path):
     np.testing.assert_allclose(store.record["length"], laplacian.agreed.length, rtol=1e-12)
     core.tiles.run_steps(store)
     same(in_order(store, "areas"), laplacian.areas, 1e-6)
-    same(in_order(store, "mean_curvature"), core.mean_curvature(laplacian), 1e-6)
+    same(in_order(store, "mean_curvature"), core.measure.mean_curvature(laplacian), 1e-6)
 
 
 def test_halos_are_as_wide_as_kernels_ask_for():

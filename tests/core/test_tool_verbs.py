@@ -181,7 +181,7 @@ class TestParts:
         source, laplacian = write(tmp_path / "a.ply", points), core.build_laplacian(points)
         code, [line] = run("segment", source, "--parts", 3, "--out", tmp_path / "a.npz")
         assert (code, line["done"]) == (0, "a: 3 parts")
-        assert_array_equal(np.load(tmp_path / "a.npz")["segment"], core.segment(laplacian, 3))
+        assert_array_equal(np.load(tmp_path / "a.npz")["segment"], core.spectral.segment(laplacian, 3))
         code, [line] = run("segment", source, "--method", "nodal", "--out", tmp_path / "a.npz")
         assert (code, line["done"]) == (0, "a: 2 parts")
         parts = np.load(tmp_path / "a.npz")["segment"]
@@ -190,7 +190,10 @@ class TestParts:
 
     def test_signatures_have_a_column_for_each_scale(self, run, tmp_path):
         source, laplacian = write(tmp_path / "a.ply", SPHERE), core.build_laplacian(SPHERE)
-        for kind, signature in (("heat", core.heat_kernel_signature), ("wave", core.wave_kernel_signature)):
+        for kind, signature in (
+            ("heat", core.spectral.heat_kernel_signature),
+            ("wave", core.spectral.wave_kernel_signature),
+        ):
             given = "--kind", kind, "--count", 3, "--modes", 20
             code, [line] = run("signature", source, *given, "--out", tmp_path / "a.npz")
             assert (code, line["done"]) == (0, "a: signatures at 3 scales")
@@ -270,12 +273,12 @@ class TestMoving:
         found = np.load(tmp_path / "a.npz")["points"]
         laplacian, squared, low = core.build_laplacian(points), (0.8 / (2.0 * np.pi)) ** 2, (2.0 * np.pi / 0.8) ** 2
         full = {
-            "noise": lambda: core.fair_points(laplacian, squared),
-            "heat": lambda: core.smooth_points(laplacian, core.exponential(np.log(2.0) * squared)),
-            "modes": lambda: core.smooth_points(laplacian, 20),
-            "detail": lambda: core.smooth_points(laplacian, core.boost(0.5, low, 64.0 * low)),
+            "noise": lambda: core.clean.fair_points(laplacian, squared),
+            "heat": lambda: core.clean.smooth_points(laplacian, core.clean.exponential(np.log(2.0) * squared)),
+            "modes": lambda: core.clean.smooth_points(laplacian, 20),
+            "detail": lambda: core.clean.smooth_points(laplacian, core.clean.boost(0.5, low, 64.0 * low)),
         }[method]()
-        assert_allclose(found, core.PointBlend(laplacian, keep="volume")(full), atol=1e-9)
+        assert_allclose(found, core.clean.PointBlend(laplacian, keep="volume")(full), atol=1e-9)
         code, [line] = run("smooth", source, "--wavelength", 9)
         assert (code, 'longer than "a" is large' in line["error"]) == (1, True)
 
@@ -322,7 +325,7 @@ class TestMoving:
     def test_splats_are_bent_with_their_points(self, run, tmp_path, verb):
         cap = SPHERE[SPHERE[:, 2] > 0.2]
         count = len(cap)
-        splats = core.Splats(
+        splats = core.splats.Splats(
             positions=cap,
             scales=np.full((count, 3), [0.05, 0.05, 0.01]),
             rotations=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
@@ -330,11 +333,11 @@ class TestMoving:
             colors=np.zeros((count, 3)),
             harmonics=np.zeros((count, 0, 3)),
         )
-        core.write_splats(tmp_path / "a.ply", splats)
+        core.splats.write_splats(tmp_path / "a.ply", splats)
         given = {"minimal-surface": ("--steps", 1)}.get(verb, ())
         code, [line] = run(verb, tmp_path / "a.ply", *given, "--out", tmp_path / "b.ply")
         assert (code, line["points"]) == (0, count), line
-        found = core.read_splats(tmp_path / "b.ply")
+        found = core.splats.read_splats(tmp_path / "b.ply")
         assert np.abs(found.positions - cap).max() > 1e-6
         if verb != "smooth":  # which hardly moves points of a smooth surface
             assert np.abs(found.scales - splats.scales).max() > 1e-4

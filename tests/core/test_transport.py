@@ -128,18 +128,18 @@ class TestTwoGrid:
     def test_what_does_not_converge_is_an_error(self, square, monkeypatch):
         monkeypatch.setattr("core.algebra.two_grid._STEPS", 1)
         with pytest.raises(core.SolverError, match="in 1 steps"):
-            core.transport(square, [0], [1.0, 0.0, 0.0])
+            core.distance.transport(square, [0], [1.0, 0.0, 0.0])
 
 
 class TestTransport:
     def test_constant_on_a_plane(self, square):
-        found = core.transport(square, [5, 800], [3.0, 4.0, 7.0])
+        found = core.distance.transport(square, [5, 800], [3.0, 4.0, 7.0])
         assert_allclose(found, np.tile([0.6, 0.8, 0.0], (1600, 1)), atol=1e-6)
 
     def test_along_great_circles(self, sphere):
         points, source = sphere.points, 7
         direction = np.cross(points[source], [0.0, 0.0, 1.0])
-        found = core.transport(sphere, [source], direction)
+        found = core.distance.transport(sphere, [source], direction)
         # The rotation that takes the source to a point along the great circle takes the direction with it.
         direction /= np.linalg.norm(direction)
         total = points + points[source]
@@ -154,13 +154,13 @@ class TestTransport:
         points = open_cylinder()[::2]
         laplacian = core.build_laplacian(points)
         axis = np.argmin(np.abs(laplacian.normals).mean(axis=0))
-        found = core.transport(laplacian, [len(points) // 2], np.eye(3)[axis])
+        found = core.distance.transport(laplacian, [len(points) // 2], np.eye(3)[axis])
         assert_allclose(found[:, axis], 1.0, atol=1e-3)
 
     def test_the_nearest_of_several_sources_counts(self, square):
         x = square.points[:, 0]
         left, right = np.argmin(x), np.argmax(x)
-        found = core.transport(square, [left, right], [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+        found = core.distance.transport(square, [left, right], [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
         near = np.linalg.norm(square.points[:, None] - square.points[[left, right]], axis=2)
         assert found[near[:, 0] < 0.5 * near[:, 1], 0].min() > 0.95
         assert found[near[:, 1] < 0.5 * near[:, 0], 1].min() > 0.95
@@ -178,7 +178,7 @@ class TestTransport:
     )
     def test_wrong_arguments(self, square, sources, directions, message):
         with pytest.raises(core.InvalidPointsError, match=message):
-            core.transport(square, sources, directions)
+            core.distance.transport(square, sources, directions)
 
 
 class TestLogarithmicMap:
@@ -188,7 +188,7 @@ class TestLogarithmicMap:
     def test_on_a_plane_differences_of_coordinates(self, sample, mean, most):
         laplacian = core.build_laplacian(sample(2000))
         source = np.argmin(np.linalg.norm(laplacian.points - laplacian.points.mean(axis=0), axis=1))
-        found = core.logarithmic_map(laplacian, source, [1.0, 0.0, 0.0])
+        found = core.distance.logarithmic_map(laplacian, source, [1.0, 0.0, 0.0])
         exact = (laplacian.points - laplacian.points[source])[:, :2] * [1.0, laplacian.normals[source, 2]]
         error = np.linalg.norm(found - exact, axis=1) / np.ptp(exact[:, 0])
         assert np.sqrt(np.mean(error**2)) < mean  # on a grid shortest paths keep to its directions
@@ -196,7 +196,7 @@ class TestLogarithmicMap:
 
     def test_on_a_sphere_distance_and_azimuth(self, sphere):
         direction = np.array([0.0, 0.3, 1.0])
-        found = core.logarithmic_map(sphere, 7, direction)
+        found = core.distance.logarithmic_map(sphere, 7, direction)
         exact, distance = exact_map(sphere, 7, direction)
         error = np.linalg.norm(found - exact, axis=1)[distance < 2.6]
         assert np.sqrt(np.mean(error**2)) < 0.025
@@ -207,7 +207,7 @@ class TestLogarithmicMap:
         points = np.column_stack([np.cos(around), np.sin(around), height])
         laplacian = core.build_laplacian(points)
         source = np.argmin(np.hypot(around - np.pi, height - 1.5))
-        found = core.logarithmic_map(laplacian, source, [0.0, 0.0, 1.0])
+        found = core.distance.logarithmic_map(laplacian, source, [0.0, 0.0, 1.0])
         out = np.sign(laplacian.normals[source, :2] @ points[source, :2])
         exact = np.column_stack([height - height[source], -out * (around - around[source])])
         near = np.abs(around - np.pi) < 2.0
@@ -216,24 +216,24 @@ class TestLogarithmicMap:
         assert np.quantile(error, 0.99) < 0.1
 
     def test_a_direction_turns_the_map(self, sphere):
-        carried = core.Transport(sphere)
+        carried = core.distance.Transport(sphere)
         normal = sphere.normals[7]
         first = np.cross(normal, [1.0, 0.0, 0.0])
         along, across = (carried.logarithmic_map(7, axis) for axis in (first, np.cross(normal, first)))
         assert_allclose(across, np.column_stack([along[:, 1], -along[:, 0]]), atol=1e-2)
 
     def test_a_second_map_uses_what_the_first_one_made(self, sphere, monkeypatch):
-        carried = core.Transport(sphere)
+        carried = core.distance.Transport(sphere)
         carried.logarithmic_map(7)
-        given = core.Transport(sphere).logarithmic_map(1234, geodesics=Geodesics(sphere))
+        given = core.distance.Transport(sphere).logarithmic_map(1234, geodesics=Geodesics(sphere))
         monkeypatch.setattr(Geodesics, "__init__", lambda *_, **__: pytest.fail("lengths were made again"))
         assert_array_equal(carried.logarithmic_map(1234), given)
 
     def test_stages_are_reported(self):
         laplacian, reports = core.build_laplacian(random_sphere(600)), []
-        core.logarithmic_map(laplacian, 7, progress=lambda stage, fraction: reports.append(stage))
+        core.distance.logarithmic_map(laplacian, 7, progress=lambda stage, fraction: reports.append(stage))
         assert {"Equations", "Factors", "Directions", "Lengths", "Distance"} == set(reports)
 
     def test_wrong_source(self, square):
         with pytest.raises(core.InvalidPointsError, match="whole numbers below"):
-            core.logarithmic_map(square, 1600)
+            core.distance.logarithmic_map(square, 1600)

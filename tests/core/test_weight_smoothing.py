@@ -28,7 +28,7 @@ def halves(strip):
 def test_a_step_becomes_that_of_heat(strip, halves):
     """After the time ``length^2 / 4`` it is the integral of a Gaussian of the length."""
     points, laplacian = strip
-    soft = core.smooth_weights(laplacian, halves, 0.6)
+    soft = core.rig.smooth_weights(laplacian, halves, 0.6)
     assert soft[:, 1] == pytest.approx(0.5 + 0.5 * erf(points[:, 0] / 0.6), abs=0.01)
 
 
@@ -36,7 +36,7 @@ def test_points_that_are_not_chosen_stay_and_flow_in(strip, halves):
     """After a long time a band between two held ends is linear, and continuous there."""
     points, laplacian = strip
     x = points[:, 0]
-    soft = core.smooth_weights(laplacian, halves, 20.0, chosen=np.abs(x) < 1.0)
+    soft = core.rig.smooth_weights(laplacian, halves, 20.0, chosen=np.abs(x) < 1.0)
     assert np.array_equal(soft[np.abs(x) >= 1.0], halves[np.abs(x) >= 1.0])
     assert soft[:, 1] == pytest.approx(np.clip(0.5 + 0.5 * x / 1.05, 0.0, 1.0), abs=0.03)
     assert soft.sum(axis=1) == pytest.approx(1.0, abs=1e-9)
@@ -52,18 +52,18 @@ def test_nothing_flows_between_loose_parts_that_touch(strip, halves):
             np.column_stack([index[inner].ravel(), index[inner + 1].ravel()]),
         ]
     )
-    assert core.smooth_weights(laplacian, halves, 0.5, edges=edges) == pytest.approx(halves, abs=1e-9)
+    assert core.rig.smooth_weights(laplacian, halves, 0.5, edges=edges) == pytest.approx(halves, abs=1e-9)
     joined = np.concatenate([edges, [[index[COLUMNS // 2 - 1, 0], index[COLUMNS // 2, 0]]]])
-    assert np.abs(core.smooth_weights(laplacian, halves, 0.5, edges=joined) - halves).max() > 0.3
-    loose = core.smooth_weights(laplacian, halves, 0.5, edges=np.empty((0, 2), int))
-    assert loose == pytest.approx(core.smooth_weights(laplacian, halves, 0.5), abs=1e-12)
+    assert np.abs(core.rig.smooth_weights(laplacian, halves, 0.5, edges=joined) - halves).max() > 0.3
+    loose = core.rig.smooth_weights(laplacian, halves, 0.5, edges=np.empty((0, 2), int))
+    assert loose == pytest.approx(core.rig.smooth_weights(laplacian, halves, 0.5), abs=1e-12)
 
 
 def test_little_flows_between_bodies_that_touch_at_a_point():
     """Where the operator's normals of one are reversed; what flows next to the contact fades from there."""
     points, first = touching_balls(4000)  # 0.3 is five spacings: within the reach of a kernel chance decides
     hard = np.column_stack([first, ~first]).astype(float)
-    change = np.abs(core.smooth_weights(core.build_laplacian(points), hard, 0.3) - hard).max(axis=1)
+    change = np.abs(core.rig.smooth_weights(core.build_laplacian(points), hard, 0.3) - hard).max(axis=1)
     away = np.linalg.norm(points - [1.0, 0.0, 0.0], axis=1)
     assert change[away > 0.3].max() < 0.06
     assert change[away > 0.5].max() < 0.015
@@ -77,15 +77,15 @@ def test_empty_points_of_a_loose_part_are_filled_within_it(strip, halves):
     edges = np.concatenate([edges, np.column_stack([index[:, :-1].ravel(), index[:, 1:].ravel()])])
     holes = halves.copy()
     holes[np.abs(points[:, 0]) < 0.5] = 0.0
-    assert core.smooth_weights(laplacian, holes, 0.0, edges=edges) == pytest.approx(halves, abs=1e-9)
+    assert core.rig.smooth_weights(laplacian, holes, 0.0, edges=edges) == pytest.approx(halves, abs=1e-9)
 
 
 def test_some_columns_are_smoothed_and_the_others_share_what_they_leave(strip):
     points, laplacian = strip
     weights = np.tile([0.2, 0.5, 0.0, 0.3], (len(points), 1))
     weights[points[:, 0] > 0.0] = [0.6, 0.0, 0.1, 0.3]
-    soft = core.smooth_weights(laplacian, weights, 0.4, columns=[0], locked=[3])
-    alone = core.smooth_weights(laplacian, weights[:, :1], 0.4)
+    soft = core.rig.smooth_weights(laplacian, weights, 0.4, columns=[0], locked=[3])
+    alone = core.rig.smooth_weights(laplacian, weights[:, :1], 0.4)
     assert np.array_equal(soft[:, 3], weights[:, 3])
     assert soft[:, 0] == pytest.approx(alone[:, 0], abs=1e-9)
     assert soft.sum(axis=1) == pytest.approx(1.0, abs=1e-12)
@@ -95,14 +95,14 @@ def test_some_columns_are_smoothed_and_the_others_share_what_they_leave(strip):
 def test_few_influences_and_none_below_the_least_stay(strip):
     points, laplacian = strip
     weights = np.random.default_rng(0).dirichlet([0.5] * 6, len(points))
-    few = core.smooth_weights(laplacian, weights, 0.0, influences=3, least=0.1, locked=[5])
+    few = core.rig.smooth_weights(laplacian, weights, 0.0, influences=3, least=0.1, locked=[5])
     assert np.count_nonzero(few[:, :5], axis=1).max() <= 2
     assert np.array_equal(few[:, 5], weights[:, 5])
     assert few.sum(axis=1) == pytest.approx(1.0, abs=1e-12)
     assert np.array_equal(few[:, :5].argmax(axis=1), weights[:, :5].argmax(axis=1))
-    every = core.smooth_weights(laplacian, weights, 0.0, influences=2**70, least=0.1)
-    assert np.array_equal(every, core.smooth_weights(laplacian, weights, 0.0, influences=6, least=0.1))
-    half = core.smooth_weights(laplacian, 0.5 * weights, 0.0, influences=1)
+    every = core.rig.smooth_weights(laplacian, weights, 0.0, influences=2**70, least=0.1)
+    assert np.array_equal(every, core.rig.smooth_weights(laplacian, weights, 0.0, influences=6, least=0.1))
+    half = core.rig.smooth_weights(laplacian, 0.5 * weights, 0.0, influences=1)
     assert half.max(axis=1) == pytest.approx(0.5, abs=1e-12)
 
 
@@ -118,4 +118,4 @@ def test_few_influences_and_none_below_the_least_stay(strip):
 )
 def test_bad_input_is_refused(strip, halves, options, text):
     with pytest.raises(core.PointCloudError, match=text):
-        core.smooth_weights(strip[1], halves, 0.1, **options)
+        core.rig.smooth_weights(strip[1], halves, 0.1, **options)

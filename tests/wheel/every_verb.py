@@ -43,7 +43,7 @@ def prepare():
     mf.files.write_points(Path("groups.ply"), mf.files.PointTable(points, columns))
     turned = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))
     shape = np.full((count, 3), 0.02), turned, np.full(count, 0.9), np.zeros((count, 3)), np.zeros((count, 0, 3))
-    mf.write_splats("splats.ply", mf.Splats(points, *shape))
+    mf.splats.write_splats("splats.ply", mf.splats.Splats(points, *shape))
     ends = {"handles": [{"center": top.tolist(), "radius": 0.3, "shift": [0, 0, 0.1]}]}
     ends["anchors"] = [{"center": low.tolist(), "radius": 0.3}]
     Path("handles.json").write_text(json.dumps(ends))
