@@ -1,7 +1,7 @@
 """Verbs for clouds of files: what is read, and the Laplacian of it."""
 
 from . import analysis, clouds, core
-from .inputs import add_choices, las_choices
+from .inputs import add_choices, files_in, las_choices
 from .quantities import ORIENTATION
 from .settings import LAPLACIAN, add_setting, chosen, laplacian_options
 from .stages import ToldStages
@@ -33,17 +33,30 @@ class CloudVerb(Verb):
         for setting in self.settings:
             add_setting(parser, setting)
         add_choices(parser)
+        for kind in clouds.kinds().values():
+            kind.add_options(parser)
 
-    def read(self, path, arguments, columns=""):
-        """Return what a file holds, points or splats."""
-        return clouds.read_file(path, columns, las_choices(arguments))
+    def expand(self, path, arguments):
+        return files_in(path, clouds.inputs()) if path.is_dir() else [path]
+
+    def read(self, path, arguments, option="object"):
+        """Return what a file holds, points or splats; where it has objects, of the one that an option names."""
+        kind = clouds.kind_of(path)
+        if kind is not None:
+            return kind.read(path, getattr(arguments, option), f"--{option.replace('_', '-')}", arguments)
+        return clouds.read_file(path, arguments.columns if option == "object" else "", las_choices(arguments))
 
     def run(self, path, arguments, output):
-        given = self.read(path, arguments, arguments.columns)
+        given, kind = self.read(path, arguments), clouds.kind_of(output)
         core.check_room(len(clouds.positions(given)), self.bytes_a_point)
+        if kind is not None and given.owner is None:
+            given = kind.own(path.stem, given, arguments)
         with ToldStages(self.name) as stages:
-            figures, notices = self.work(path, given, arguments, output, stages)
-        return {**figures, "seconds": stages.rounded, "notices": [*given.notices, *notices]}
+            figures, notices = self.work(path, given, clouds.with_own(arguments, given), output, stages)
+        notices = [*given.notices, *notices]
+        if kind is not None:
+            given.owner.save(output, self.operator or self.name.replace("-", "_"), notices, stages.seconds)
+        return {**figures, "seconds": stages.rounded, "notices": notices}
 
     def work(self, path, given, arguments, output, progress):
         """Process points or splats, write the output, and return what to print, and notices."""
@@ -59,9 +72,9 @@ class SurfaceVerb(CloudVerb):
             add_setting(parser, setting)
 
     def boundary(self, cloud, values):
-        """Return the boundary points that a column names, (n,) bool; None if none does."""
+        """Return the boundary points that a group or column names, (n,) bool; None if none does."""
         name = values["boundary_group"]
-        return cloud.numbers(name, "--boundary-group") > 0 if name else None
+        return cloud.members(name, "--boundary-group") if name else None
 
     def build(self, cloud, values, progress):
         """Return the operator of a cloud, by the values of the settings in `LAPLACIAN`."""

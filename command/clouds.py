@@ -1,23 +1,95 @@
-"""Points or splats of a file, and the files that their results are written to."""
+"""Points or splats of a file, and the files that their results are written to.
 
+Beside the kinds of files that core reads and writes there is one more where Blender is, which registers it here.
+"""
+
+from argparse import Namespace
 from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from . import core
-from .quantities import NORMAL, PREFIX
+from .quantities import NORMAL, ORIENTATION, PREFIX, quantity
+from .settings import as_place, place
 
 _FILE_NORMAL = "normal"  # the attribute that files call nx ny nz
+_BLEND = ".blend"
+_FOR_BLENDER = (
+    "Files of Blender are read and written by Blender itself: blender --command meshfree takes the same verbs."
+)
+_kinds = {}  # further ones, by their endings
+
+
+class Kind(NamedTuple):
+    """A kind of file that a program reads and writes which holds more of it than points, in objects.
+
+    What it reads has an `owner`, the object, with these attributes: `settings`, those of the object by name; `groups`,
+    from names to weights, (n,), NaN at points outside. And methods: `taken` for some of the points and `moved` for a
+    motion, which return another owner; `write` for a cloud with results, `add_mesh`, `add_curves` and `add_profile`,
+    which change the open file; `save`, which writes it; `place`, `plane` and `curve`, which return what other objects
+    are, by name, in the coordinates of the cloud.
+
+    Attributes
+    ----------
+    add_options : callable
+        Of a parser: adds the options for what is read.
+    read : callable
+        Of a path, the name of an object or "", the option for it, and the arguments of a command line; opens the file.
+    own : callable
+        Of a name, what another file holds, and arguments: makes that an object of an empty file, and returns it.
+    """
+
+    add_options: Any
+    read: Any
+    own: Any
+
+
+def register(ending, kind):
+    """Add a kind of file."""
+    _kinds[ending] = kind
+
+
+def unregister(ending):
+    """Remove a kind of file."""
+    del _kinds[ending]
+
+
+def kinds() -> dict:
+    """Return the kinds of files beside those of core, by their endings."""
+    return dict(_kinds)
+
+
+def kind_of(path):
+    """Return the kind of a file, if it is one beside those of core; else None."""
+    return None if path is None else _kinds.get(path.suffix.lower())
 
 
 def inputs() -> tuple:
     """Return the endings of files that are read."""
-    return (*core.files.READABLE, *core.files.SPLATS)
+    return (*core.files.READABLE, *core.files.SPLATS, *_kinds)
 
 
 def outputs() -> tuple:
     """Return the endings of files that results are written to."""
-    return (*core.files.WRITABLE, ".npz")
+    return (*_kinds, *core.files.WRITABLE, ".npz")
+
+
+def hint(path) -> str:
+    """Return where a file of this name could be read and written, if it is one of Blender and this is another place."""
+    return f" {_FOR_BLENDER}" if path.suffix.lower() == _BLEND and not _kinds else ""
+
+
+def place_or_object(text):
+    """Parse X,Y,Z as a position, (3,), or take a text as the name of an object, where there are files of such."""
+    return text if _kinds and as_place(text) is None else place(text)
+
+
+def with_own(arguments, given):
+    """Return arguments in which the settings that the command line does not give are those of an object, if any."""
+    own = {} if given.owner is None else given.owner.settings
+    values = vars(arguments)
+    return Namespace(**values | {name: own[name] for name in own.keys() & values.keys() if values[name] is None})
 
 
 def read_file(path, columns="", las=None):
@@ -35,6 +107,8 @@ def read_file(path, columns="", las=None):
     -------
     Splats or PointTable
     """
+    if hint(path):
+        raise core.PointCloudError(f"{path} cannot be read.{hint(path)}")
     if columns.strip():
         return core.files.read_points(path, columns)
     choices = core.files.LasChoices() if las is None else las
@@ -77,22 +151,46 @@ class Cloud:
         """Other numbers of the points, by name."""
         return {} if self.splats is not None else self.given.attributes
 
+    @property
+    def owner(self):
+        """The object that the points belong to, as of `Kind`, whose file has others that options name."""
+        if self.given.owner is None:
+            raise core.PointCloudError(
+                f"{self.path} holds points alone, and no objects that could be named. Give a position X,Y,Z, or a file."
+            )
+        return self.given.owner
+
+    @property
+    def groups(self):
+        """Weights by the names of groups, as of `Kind`; none in files of points."""
+        return {} if self.given.owner is None else self.given.owner.groups
+
+    def has(self, name) -> bool:
+        """Whether there is a group or a column of a name."""
+        return name in self.groups or name in self.columns
+
+    def members(self, name, what):
+        """Return the points, (n,) bool, with weights or numbers above 0 in the group or column that an option names."""
+        return (self.groups[name] if name in self.groups else self.numbers(name, what)) > 0
+
     def numbers(self, name, what):
         """Return the column of a name, (n,), that an option asks for."""
         if name not in self.columns:
-            known = ", ".join(self.columns) or "none"
+            known = ", ".join([*self.columns, *self.groups]) or "none"
+            kinds = "columns" if self.given.owner is None else "columns and groups"
             raise core.PointCloudError(
-                f'{self.path} has no column "{name}", which {what} names. Its columns are {known}.'
+                f'{self.path} has no column "{name}", which {what} names. Its {kinds} are {known}.'
             )
         return self.columns[name]
 
     def taken(self, kept):
         """Return the file's content of some of the points, (n,) bool."""
+        owner = None if self.given.owner is None else self.given.owner.taken(kept)
         if self.splats is not None:
-            return _some(self.splats, kept)
+            return replace(_some(self.splats, kept), owner=owner)
         colors = None if self.given.colors is None else self.given.colors[kept]
         columns = {name: values[kept] for name, values in self.columns.items()}
-        return replace(self.given, points=self.given.points[kept], attributes=columns, colors=colors)
+        return replace(self.given, points=self.given.points[kept], attributes=columns, colors=colors, owner=owner)
 
 
 def moved(given, points, matrix, place):
@@ -109,11 +207,17 @@ def moved(given, points, matrix, place):
         To which the result is relative.
     """
     linear, after = matrix[:3, :3], points @ matrix[:3, :3].T + matrix[:3, 3] + place
+    if given.owner is not None:
+        whole = matrix.copy()
+        whole[:3, 3] += place - linear @ place
+        given = replace(given, owner=given.owner.moved(whole))
     if isinstance(given, core.splats.Splats):
         return given.deformed(after, np.broadcast_to(linear, (len(after), 3, 3)))
     columns = dict(given.attributes)
-    if np.ndim(columns.get(_FILE_NORMAL)) == 2:
-        columns[_FILE_NORMAL] = columns[_FILE_NORMAL] @ (linear / np.cbrt(np.linalg.det(linear))).T
+    turn = (linear / np.cbrt(np.linalg.det(linear))).T
+    for name, values in columns.items():
+        if np.ndim(values) == 2 and (name in (_FILE_NORMAL, ORIENTATION) or quantity(name).is_direction):
+            columns[name] = values @ turn
     if np.ndim(columns.get(core.files.SCANNER)) == 2:
         # Relative to the points, whose own motion is known, so that no digits are lost far from the origin.
         away = columns[core.files.SCANNER] - given.points
@@ -121,8 +225,10 @@ def moved(given, points, matrix, place):
     return replace(given, points=after, attributes=columns)
 
 
-def write(path, given, results, arrays=None) -> list:
+def write(path, given, results, arrays=None, numbers=None) -> list:
     """Write points or splats with results to a file of a kind in `outputs`.
+
+    Of a kind beside those of core they are put into the open file, which is saved at the end.
 
     Parameters
     ----------
@@ -133,16 +239,20 @@ def write(path, given, results, arrays=None) -> list:
         By the names of attributes.
     arrays : dict of str to ndarray, optional
         For .npz files, if not the points and results.
+    numbers : dict of str to ndarray, optional
+        Further results, which are not at the points, by name: .npz files and objects hold them.
 
     Returns
     -------
     list of str
         Notices of what is written in another form.
     """
+    if kind_of(path) is not None:
+        return given.owner.write(given, results, numbers or {})
     splats = isinstance(given, core.splats.Splats)
     if path.suffix.lower() == ".npz":
         points = np.asarray(given.positions if splats else given.points, dtype=np.float64)
-        named = {name.removeprefix(PREFIX): values for name, values in results.items()}
+        named = {name.removeprefix(PREFIX): values for name, values in (results | (numbers or {})).items()}
         save_arrays(path, {"points": points, **named} if arrays is None else arrays)
         return []
     if splats:

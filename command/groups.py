@@ -3,6 +3,7 @@
 import numpy as np
 
 from . import core
+from .clouds import kind_of
 from .settings import place
 
 HANDLE, ANCHOR, FIXED, SOURCE, LOW, HIGH, VALUE, BOUNDARY_GROUP = ROLES = (
@@ -48,11 +49,19 @@ def check_enough(weights, kind: str, name: str, setting: str, least: int = 1, ho
         )
 
 
-def read_weights(cloud, name: str, option: str, least: int = 1):
-    """Return the weights, (n,), in the column of a cloud that an option names."""
-    weights = column_weights(cloud.numbers(name, option), name, str(cloud.path))
-    check_enough(weights, "column", name, option, least)
-    return weights
+def read_weights(cloud, name: str, option: str, least: int = 1, outside: float = 0.0):
+    """Return the weights, (n,), in the group or column of a cloud that an option names, with those of points outside.
+
+    Outside of a column are the points of weight 0.
+    """
+    if name in cloud.groups:
+        weights = cloud.groups[name]
+        inside, kind = np.isfinite(weights), "group"
+    else:
+        weights = column_weights(cloud.numbers(name, option), name, str(cloud.path))
+        inside, kind = weights > 0.0, "column"
+    check_enough(weights, kind, name, option, least)
+    return np.where(inside, weights, outside)
 
 
 def add_at(parser):
@@ -67,18 +76,18 @@ def add_at(parser):
     )
 
 
-def check_sources(parser, arguments, within=False):
-    """Refuse command lines that name sources twice or not at all, by `parser.error`; inputs may hold them within."""
+def check_sources(parser, arguments):
+    """Refuse command lines that name sources twice or not at all, by `parser.error`; objects may have such a group."""
     if arguments.at and arguments.group:
         parser.error("--at and --group both say which points are the sources: give one of them")
-    if not (arguments.at or arguments.group or within):
+    if not (arguments.at or arguments.group or all(map(kind_of, arguments.inputs))):
         parser.error("nothing says which points are the sources: give --at X,Y,Z, or --group with a column's name")
 
 
 def read_sources(cloud, arguments):
     """Return the source points of a cloud, (n,) bool: the nearest ones of positions, or those in a column."""
     if not arguments.at:
-        return read_weights(cloud, arguments.group, "--group") > 0.0
+        return read_weights(cloud, arguments.group or SOURCE, "--group") > 0.0
     return np.isin(np.arange(len(cloud.points)), nearest_to(cloud, arguments.at))
 
 

@@ -8,7 +8,10 @@ import tempfile
 from pathlib import Path
 
 from . import core
+from .clouds import hint
 from .stages import tell_aside
+
+_READ = (*core.files.READABLE, *core.files.SPLATS)
 
 
 def add_files(parser, verb):
@@ -77,7 +80,7 @@ def find_inputs(parser, verb, arguments):
     What folders have besides is told by the notices `left_out`, and `total` is the number of files of all shares.
     """
     if arguments.out is not None and arguments.out.suffix.lower() not in verb.outputs:
-        parser.error(f"--out must end in {', '.join(verb.outputs)}")
+        parser.error(f"--out must end in {', '.join(verb.outputs)}.{hint(arguments.out)}")
     files, arguments.left_out = [], []
     try:
         given = [*arguments.inputs, *_listed(arguments.files_from)]
@@ -160,21 +163,20 @@ def _listed(source):
     return [Path(line.strip()) for line in text.splitlines() if line.strip()]
 
 
-def files_in(folder):
-    """Return all files with points in a folder, ordered by numbers."""
+def files_in(folder, endings=_READ):
+    """Return all files with points in a folder, of these endings, ordered by numbers."""
     try:
-        paths = [path for path in folder.iterdir() if path.suffix.lower() in _READ and path.is_file()]
+        paths = [path for path in folder.iterdir() if path.suffix.lower() in endings and path.is_file()]
     except OSError as error:
         raise core.PointCloudError(
             f"The folder {folder} cannot be read: {error.strerror or error}. Check it."
         ) from error
     if not paths:
-        raise core.PointCloudError(f"{folder} has no files with points. Name one with files of {', '.join(_READ)}.")
+        raise core.PointCloudError(f"{folder} has no files with points. Name one with files of {', '.join(endings)}.")
     return sorted(paths, key=lambda path: _natural(path.name))
 
 
 _SHOWN = 5  # names of what is left out
-_READ = (*core.files.READABLE, *core.files.SPLATS)
 
 
 def _natural(name):

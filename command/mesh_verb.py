@@ -13,8 +13,13 @@ class Mesh(SurfaceVerb):
 
     name = "mesh"
     help = "reconstruct a mesh from the points, with their columns and colors on its vertices"
-    outputs = core.files.MESHES
     settings = tuple(MESH.values())
+    operator = "mesh_surface"
+
+    @property
+    def outputs(self):
+        """Endings of files."""
+        return (*clouds.kinds(), *core.files.MESHES)
 
     def work(self, path, given, arguments, output, progress):
         cloud = clouds.Cloud(path, given, floaters(arguments))
@@ -24,7 +29,10 @@ class Mesh(SurfaceVerb):
         faces, written = [mesh.faces, closed], []
         if output is not None:
             table = _on_vertices(cloud, laplacian, mesh.vertices)
-            written = core.files.write_mesh(output, table, faces, double=not table.single)
+            if clouds.kind_of(output) is not None:
+                given.owner.add_mesh(table, faces)
+            else:
+                written = core.files.write_mesh(output, table, faces, double=not table.single)
         figures = {"vertices": len(mesh.vertices), "faces": sum(map(len, faces)), "open_edges": opened}
         return {"points": len(cloud.points), **figures}, [*laplacian.notices, *mesh.notices, *written]
 
@@ -37,9 +45,10 @@ def _on_vertices(cloud, laplacian, vertices):
         tint = None if cloud.given.colors is None else colors.linear(cloud.given.colors)
     single = cloud.splats is not None or cloud.given.single
     table = core.files.PointTable(vertices + cloud.place, single=single)
-    if cloud.columns or tint is not None:
+    columns = {**cloud.columns, **{name: np.nan_to_num(weights) for name, weights in cloud.groups.items()}}
+    if columns or tint is not None:
         carrying, count = core.surface.values_on_mesh(laplacian, vertices), len(vertices)
-        for name, values in cloud.columns.items():
+        for name, values in columns.items():
             carry = carrying.interpolate if values.dtype.kind == "f" else carrying.labels
             table.attributes[name] = carry(values)[-count:]
         if tint is not None:

@@ -3,12 +3,9 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
-import numpy as np
-
 from . import clouds, core, minimal, smoothing, uncached
 from .cloud_verb import SurfaceVerb, floaters
 from .groups import is_chosen, read_weights
-from .quantities import PREFIX
 from .results import number_text
 from .settings import LAPLACIAN, chosen, default_options
 
@@ -72,7 +69,7 @@ class MinimalSurface(SurfaceVerb):
         cloud, own = clouds.Cloud(path, given, floaters(arguments)), chosen(self.settings, arguments)
         values, name = chosen(LAPLACIAN.values(), arguments), own["group"]
         fixed, laplacian = self.boundary(cloud, values), None
-        if is_chosen(name, minimal.MINIMAL["group"].default, name in cloud.columns):
+        if is_chosen(name, minimal.MINIMAL["group"].default, cloud.has(name)):
             fixed = read_weights(cloud, name, "--group") > 0.0
         if fixed is None or cloud.splats is not None:
             laplacian = self.build(cloud, values, progress).laplacian
@@ -82,23 +79,20 @@ class MinimalSurface(SurfaceVerb):
         film = minimal.shrink(cloud.points, fixed, own["tolerance"], own["steps"], default_options(values), progress)
         written = []
         if output is not None:
-            history = {minimal.HISTORY.removeprefix(PREFIX): film.area_history}
-            written = _write(output, cloud, film.points, laplacian, history)
+            written = _write(output, cloud, film.points, laplacian, {minimal.HISTORY: film.area_history})
         line = minimal.film_line(film, path.stem, number_text)
         told = [] if laplacian is None else laplacian.notices
         return {"points": len(film.points), "done": line}, [*told, *film.notices, *written]
 
 
-def _write(output, cloud, points, laplacian, arrays=None) -> list:
-    """Write a cloud whose points have moved, with further arrays to .npz files; return notices.
+def _write(output, cloud, points, laplacian, numbers=None) -> list:
+    """Write a cloud whose points have moved, with further numbers as of `clouds.write`; return notices.
 
     Splats are deformed by the gradients that their operator gives.
     """
     given, moved = cloud.given, points - cloud.points
     if cloud.splats is not None:
         after = given.deformed(given.positions + moved, core.deform.deformation_gradients(laplacian, points))
-        places = after.positions
     else:
-        places = given.points + moved  # so that points that stay keep all of their digits
-        after = replace(given, points=places)
-    return clouds.write(output, after, {}, {"points": np.asarray(places, dtype=np.float64), **(arrays or {})})
+        after = replace(given, points=given.points + moved)  # so that points that stay keep all of their digits
+    return clouds.write(output, after, {}, numbers=numbers)

@@ -22,11 +22,11 @@ ORIENT = {
 _METHODS = {"WINDING": "winding", "OUTSIDE": "outside"}  # in core; others are by viewpoints
 
 
-def add_viewpoint(parser, implied):
-    """Add the option for a viewpoint; `implied` is what it sets, for the help."""
+def add_viewpoint(parser, implied, convert=place):
+    """Add the option for a viewpoint, from a text; `implied` is what it sets, for the help."""
     parser.add_argument(
         "--viewpoint",
-        type=place,
+        type=convert,
         metavar="X,Y,Z",
         help="position in the coordinates of the file from which the points were seen, as --viewpoint=X,Y,Z where X"
         f" is below zero. Sets {implied}",

@@ -27,6 +27,7 @@ DISPLACEMENT = "lb_displacement"
 MOTION, MOTION_MODE = "lb_motion", "lb_motion_"
 TRANSFER = "lb_transfer"
 EIGENVECTOR = "lb_eigenvector_"
+EIGENVALUES = "lb_eigenvalues"  # which are not at the points
 HEAT_SIGNATURE, WAVE_SIGNATURE = "lb_heat_signature_", "lb_wave_signature_"
 
 
@@ -79,6 +80,11 @@ class Quantity(NamedTuple):
     along_surface: bool = False
     numbered: bool = False
     names: tuple = ()
+
+    @property
+    def is_direction(self) -> bool:
+        """Whether it is a unit vector in space, such as a normal."""
+        return self.carried == "normal" or self.along_surface
 
     def of(self, found):
         """Return its values from the result of the tool."""

@@ -14,30 +14,50 @@ from .results import number_text
 from .settings import LAPLACIAN, chosen
 
 
-def add_reference(parser, use, required=True):
-    """Add the option for the other file."""
-    parser.add_argument("--reference", required=required, metavar="FILE", help=f"{use}, of the kinds of inputs")
+class WithReference(CloudVerb):
+    """A verb with another file, which is read once, before the first input."""
+
+    reads = ("reference",)
+    use = ""  # what the reference is for, for the help
+    required = True  # whether there must be one
+    _own = _target = None  # arguments with the settings of the reference, and its cloud
+
+    def add_options(self, parser):
+        parser.add_argument(
+            "--reference", required=self.required, metavar="FILE", help=f"{self.use}, of the kinds of inputs"
+        )
+        for ending in clouds.kinds():
+            parser.add_argument(
+                "--reference-object", default="", metavar="NAME", help=f"object of a {ending} file; else the active one"
+            )
+        super().add_options(parser)
+
+    def run(self, path, arguments, output):
+        if self._target is None and arguments.reference is not None:
+            reference = Path(arguments.reference)
+            given = self.read(reference, arguments, "reference_object")  # whose errors have its name already
+            self._own = clouds.with_own(arguments, given)
+            with naming(reference):
+                self._target = self.target(reference, given)
+        return super().run(path, arguments, output)
+
+    def target(self, path, given):
+        """Return the cloud of the reference, with all that is read of it."""
+        return clouds.Cloud(path, given)
 
 
-class Align(CloudVerb):
+class Align(WithReference):
     """The verb `align`, whose outputs are in the coordinates of the reference."""
 
     name = "align"
     help = "move points onto the surface of those of another file, from nearby"
     bytes_a_point = 500
     settings = tuple(alignment.ALIGN.values())
-    reads = ("reference",)
     operator = "align_points"  # which writes the same result in Blender
-    _target = None  # points of the reference, in its coordinates
-
-    def add_options(self, parser):
-        add_reference(parser, "point cloud that the points are moved onto")
-        super().add_options(parser)
+    use = "point cloud that the points are moved onto"
 
     def work(self, path, given, arguments, output, progress):
         reference = Path(arguments.reference)
-        if self._target is None:
-            self._target = clouds.Cloud(reference, self.read(reference, arguments))
         cloud, target = clouds.Cloud(path, given), self._target
         shift = cloud.place - target.place
         found = core.measure.align(
@@ -55,32 +75,27 @@ class Align(CloudVerb):
         return figures, [*target.notices, *alignment.doubts(found), *written]
 
 
-class ReferenceVerb(SurfaceVerb):
-    """A verb that holds surfaces against that of another file, which is read and analyzed once."""
+class ReferenceVerb(WithReference, SurfaceVerb):
+    """A verb that holds surfaces against that of another file, which is analyzed once."""
 
-    reads = ("reference",)
-    use = ""  # what the reference is for, for the help
-    required = True  # whether there must be one
-    _target = _laplacian = None
+    _laplacian = None
 
-    def add_options(self, parser):
-        add_reference(parser, self.use, self.required)
-        super().add_options(parser)
+    def target(self, path, given):
+        cloud = clouds.Cloud(path, given, floaters(self._own))
+        self.boundary(cloud, vars(self._own))
+        return cloud
 
     @property
     def read_notices(self) -> list:
         """What was told as the reference was read, if there is one."""
         return [] if self._target is None else self._target.notices
 
-    def reference(self, arguments, progress):
+    def reference(self, progress):
         """Return the cloud of the reference, and its operator."""
-        if self._target is None:
-            path = Path(arguments.reference)
-            given = self.read(path, arguments)  # whose errors have its name already
-            with naming(path):
-                target = clouds.Cloud(path, given, floaters(arguments))
-                self._laplacian = self.build(target, chosen(LAPLACIAN.values(), arguments), progress).laplacian
-            self._target = target
+        if self._laplacian is None:
+            with naming(self._target.path):
+                values = chosen(LAPLACIAN.values(), self._own)
+                self._laplacian = self.build(self._target, values, progress).laplacian
         return self._target, self._laplacian
 
 
@@ -93,7 +108,7 @@ class Compare(ReferenceVerb):
     use = "point cloud from whose surface distances are measured"
 
     def work(self, path, given, arguments, output, progress):
-        (target, laplacian), reference = self.reference(arguments, progress), Path(arguments.reference)
+        (target, laplacian), reference = self.reference(progress), Path(arguments.reference)
         cloud, values = clouds.Cloud(path, given, floaters(arguments)), chosen(LAPLACIAN.values(), arguments)
         own, shift = SimpleNamespace(**chosen(self.settings, arguments)), cloud.place - target.place
 
@@ -125,7 +140,7 @@ class TransferAttributes(ReferenceVerb):
     use = "points whose attributes are taken"
 
     def work(self, path, given, arguments, output, progress):
-        target, laplacian = self.reference(arguments, progress)
+        target, laplacian = self.reference(progress)
         own, reference = SimpleNamespace(**chosen(self.settings, arguments)), arguments.reference
         arrays, left_out = _values(target, own)
         cloud, values = clouds.Cloud(path, given, floaters(arguments)), chosen(LAPLACIAN.values(), arguments)

@@ -129,13 +129,13 @@ class HarmonicField(ResultVerb):
             source = cloud.numbers(own.source, "--source").astype(np.float64)
             fields.check_source(source, own.source, str(cloud.path))
         weights = {}
-        for setting in fields.giving(own, cloud.columns.__contains__):
+        for setting in fields.giving(own, cloud.has):
             option = f"--{setting.replace('_', '-')}"
-            held = read_weights(cloud, getattr(own, setting), option, least=int(own.values == "GROUPS"))
-            weights[setting] = np.where(held == 0.0, np.nan, held)  # points of weight 0 are outside
+            least = int(own.values == "GROUPS")
+            weights[setting] = read_weights(cloud, getattr(own, setting), option, least, outside=np.nan)
         how = "Name columns of the file by --low-group and --high-group, or by --group."
-        count, has = len(cloud.points), cloud.columns.__contains__
-        return fields.given_shares(own, weights, count, "column", str(cloud.path), how, has), source
+        count = len(cloud.points)
+        return fields.given_shares(own, weights, count, "column", str(cloud.path), how, cloud.has), source
 
     def compute(self, built, wanted, name, own, progress):
         found = fields.solved(built.laplacian, *wanted, own.low, own.high, uncached, progress)
@@ -150,7 +150,7 @@ class Orient(ResultVerb):
     settings = tuple(orienting.ORIENT.values())
 
     def add_options(self, parser):
-        orienting.add_viewpoint(parser, "the method VIEWPOINT")
+        orienting.add_viewpoint(parser, "the method VIEWPOINT", clouds.place_or_object)
         super().add_options(parser)
 
     def check(self, parser, arguments):
@@ -162,7 +162,8 @@ class Orient(ResultVerb):
 
     def wanted(self, cloud, own, arguments):
         if own.method == "VIEWPOINT":
-            return arguments.viewpoint - cloud.place, []
+            viewpoint = arguments.viewpoint
+            return (cloud.owner.place(viewpoint) if isinstance(viewpoint, str) else viewpoint) - cloud.place, []
         if own.method != "ATTRIBUTE":
             return None, []
         vectors = cloud.numbers(own.source, "--source").astype(np.float64)

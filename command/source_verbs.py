@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from . import along, core, simulation, uncached
+from . import along, clouds, core, simulation, uncached
 from .groups import add_at, check_sources, read_sources, unreached
 from .motions import Chosen
 from .quantities import MOTION
@@ -95,16 +95,21 @@ class SignedDistance(ResultVerb):
         super().add_options(parser)
 
     def wanted(self, cloud, own, arguments):
-        places = core.files.read_points(Path(arguments.curve)).points
-        return SimpleNamespace(places=places - cloud.place, closed=arguments.closed)
+        curve, closed = Path(arguments.curve), arguments.closed
+        if clouds.kinds() and curve.suffix.lower() not in core.files.READABLE:
+            places, closed = cloud.owner.curve(arguments.curve)
+        else:
+            places = core.files.read_points(curve).points
+        return SimpleNamespace(places=places - cloud.place, closed=closed)
 
     def compute(self, built, wanted, name, own, progress):
         found = along.beside_curve(built.laplacian, wanted.places, wanted.closed, uncached, progress)
         return self.named(along.told_sides(found, name, number_text))
 
 
-def add_curve(parser, more=""):
-    """Add the options for a curve; `more` of what it may be, for the help."""
+def add_curve(parser):
+    """Add the options for a curve."""
+    more = "; or the name of a curve object of the input" if clouds.kinds() else ""
     parser.add_argument(
         "--curve",
         required=True,

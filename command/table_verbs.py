@@ -8,7 +8,7 @@ from .inputs import check_beside
 from .measures import check_numbers
 from .results import number_text
 from .rows import TABLES, write_rows, write_text
-from .settings import LAPLACIAN, chosen, place
+from .settings import LAPLACIAN, chosen
 from .svg import profile_picture
 from .units import NO_UNITS
 
@@ -47,31 +47,48 @@ class Section(CutOptions, SurfaceVerb):
 
     name = "section"
     help = "cut the surface by a plane: curves, with their length and the area that they enclose"
-    outputs = TABLES
+    operator = "cross_section"
+
+    @property
+    def outputs(self):
+        """Endings of files."""
+        return (*TABLES, *clouds.kinds())
 
     def add_options(self, parser):
+        named = "; or the name of an object of the input, whose local XY plane cuts" if clouds.kinds() else ""
         parser.add_argument(
             "--plane",
-            type=place,
+            type=clouds.place_or_object,
             metavar="X,Y,Z",
-            help="position of the plane in the coordinates of the file, as --plane=X,Y,Z where X is below zero. Without"
-            " it, the middle of the points",
+            help=f"position of the plane in the coordinates of the file, as --plane=X,Y,Z where X is below zero{named}."
+            " Without it, the middle of the points",
         )
         sections.add_options(parser)
         super().add_options(parser)
+
+    def check(self, parser, arguments):
+        if arguments.normal is not None and isinstance(arguments.plane, str):
+            parser.error("--normal goes with a position, not with an object, whose plane has one")
+        super().check(parser, arguments)
 
     def work(self, path, given, arguments, output, progress):
         cloud, name = clouds.Cloud(path, given, floaters(arguments)), path.stem
         laplacian = self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress).laplacian
         guessed, position = [], sections.middle(cloud.points)
+        normal = sections.UP if arguments.normal is None else arguments.normal
         if arguments.plane is None:
             guessed = [sections.through_middle(name)]
+        elif isinstance(arguments.plane, str):
+            position, normal = cloud.owner.plane(arguments.plane)
+            position = position - cloud.place
         else:
             position = arguments.plane - cloud.place
-        normal = sections.UP if arguments.normal is None else arguments.normal
         found = sections.cut(laplacian, position, normal, None, name, progress)
         if output is not None:
-            write_rows(output, sections.curve_records(found))
+            if clouds.kind_of(output) is not None:
+                given.owner.add_curves([(curve.points + cloud.place, curve.closed) for curve in found.curves])
+            else:
+                write_rows(output, sections.curve_records(found))
             for corners in self.beside(output, arguments):
                 sections.write_corners(corners, found.curves, cloud.place)
         line = sections.section_line(found, name, number_text, number_text)
@@ -84,8 +101,12 @@ class Profile(PathOptions, SurfaceVerb):
 
     name = "profile"
     help = "measure the height or a column along the shortest path between two positions, as a table"
-    outputs = (".csv",)
     settings = tuple(profiles.PROFILE.values())
+
+    @property
+    def outputs(self):
+        """Endings of files."""
+        return (".csv", *clouds.kinds())
 
     def work(self, path, given, arguments, output, progress):
         cloud, name = clouds.Cloud(path, given, floaters(arguments)), path.stem
@@ -100,7 +121,10 @@ class Profile(PathOptions, SurfaceVerb):
         found = profiles.measured(laplacian, corners, values, own, cloud.place, cloud.place)
         if output is not None:
             table = profiles.table(found.columns, own.source)
-            write_text(output, table)
+            if clouds.kind_of(output) is not None:
+                given.owner.add_profile(found.distance, found.values, table)
+            else:
+                write_text(output, table)
             for picture in self.beside(output, arguments):
                 write_text(picture, profile_picture(table, NO_UNITS))
         line = profiles.profile_line(found, own, name, number_text)

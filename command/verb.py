@@ -13,6 +13,7 @@ class Verb:
     """
 
     name = help = description = ""  # on the command line, help in one line, and in full
+    operator = ""  # in Blender, which does the same; else that of the verb's name
     inputs = "files"
     outputs = ()  # endings of its output files, the first one by default in folders; empty for no output
     reads = ()  # options with other input files, which are never overwritten

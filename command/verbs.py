@@ -22,7 +22,7 @@ from .measures import (
 )
 from .mesh_verb import Mesh
 from .moving_verbs import MinimalSurface, ModeShape, Smooth
-from .quantities import SEGMENT, STRAY, eigenvector_name, written_by
+from .quantities import EIGENVALUES, SEGMENT, STRAY, eigenvector_name, written_by
 from .reference_verbs import Align, Compare, ReferenceVerb, TransferAttributes
 from .result_verbs import (
     HarmonicField,
@@ -150,18 +150,19 @@ class Analyze(Frames, SurfaceVerb):
             spectrum, overlaps, self._earlier = analysis.continued(spectrum, laplacian.areas, places, self._earlier)
             matched["overlaps"] = overlaps.tolist()
         measures, written = built.measures, []
+        numbers = {} if spectrum is None else {EIGENVALUES: spectrum.eigenvalues}
         if output is not None:
             vectors = () if spectrum is None else spectrum.eigenvectors[:, : own["write_limit"]].T
             modes = {eigenvector_name(number): vector for number, vector in enumerate(vectors, 1)}
             everything = analysis.arrays(cloud.place, built, spectrum) if output.suffix.lower() == ".npz" else None
-            written = clouds.write(output, given, {**measures, **modes}, everything)
+            written = clouds.write(output, given, {**measures, **modes}, everything, numbers)
         return {**analysis.figures(measures, spectrum), **matched}, [*built.notices, *notices, *written]
 
 
 class Measure(ReferenceVerb):
     """The verb `measure`, whose outputs are tables."""
 
-    name = "measure"
+    name, operator = "measure", "measure_parts"
     help = "measure every component and segment: points, area, boundary, volume, and the mean of a column"
     outputs = TABLES
     prints_all = True
@@ -202,7 +203,7 @@ class Measure(ReferenceVerb):
         """Return what `base_of` takes of the other cloud, if there is one."""
         if arguments.reference is None:
             return ()
-        target, laplacian = self.reference(arguments, progress)
+        target, laplacian = self.reference(progress)
         return lambda _: laplacian, target.place, target.path.name
 
 

@@ -1,4 +1,4 @@
-"""The registry of tools, from which panels, menus and the command line are built."""
+"""The registry of tools, from which panels and menus are built."""
 
 from dataclasses import dataclass
 from itertools import groupby
@@ -18,13 +18,12 @@ class Row(NamedTuple):
 
 @dataclass(frozen=True)
 class Registration:
-    """An operator with its rows and its verb: an item of `TOOLS` in its module."""
+    """An operator with its rows: an item of `TOOLS` in its module."""
 
     operator: type
     panel: Row | None = None  # home: the label of a panel
     menu: Row | None = None  # home: "Object", or "Points" in Edit Mode
     quick: Row | None = None  # of context menus, with the same homes: run by one click
-    verb: type | None = None  # the `Tool` of its verb on the command line
 
     @property
     def name(self) -> str:

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import chain, count
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -44,6 +45,8 @@ class PointTable:
         Which data were left out.
     las : LasForm or None
         Of a LAS file: what it states besides, so that such files are written as it was.
+    owner : object or None
+        What the points belong to, where a program holds more of it than points, and writes to it.
     """
 
     points: Floats
@@ -53,6 +56,7 @@ class PointTable:
     degrees: bool = False
     notices: list[str] = field(default_factory=list)
     las: LasForm | None = None
+    owner: Any = None
 
 
 def from_columns(columns: dict[str, Array], path: Path) -> PointTable:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -39,6 +39,8 @@ class Splats(Frozen):
         Which data of a file were left out.
     file : SplatFile or None
         The contents of a file, so that unchanged data are written as they were.
+    owner : object or None
+        What the splats belong to, where a program holds more of it than splats, and writes to it.
 
     Raises
     ------
@@ -64,6 +66,7 @@ class Splats(Frozen):
     harmonics: Floats
     notices: list[str] = field(default_factory=list)
     file: SplatFile | None = None
+    owner: Any = None
 
     def __post_init__(self) -> None:
         count = len(as_array(self.positions, "Positions")) if np.ndim(self.positions) else -1

@@ -10,9 +10,6 @@ from ...command.colors import COLOR
 from ...command.groups import column_weights
 from ...command.quantities import NORMAL, PREFIX
 from ...core.files import (
-    READABLE,
-    SPLATS,
-    WRITABLE,
     LasForm,
     PointTable,
     choose_origin,
@@ -21,15 +18,13 @@ from ...core.files import (
 )
 from ...core.files.table import NORMAL as FILE_NORMAL
 from ...core.files.table import SCANNER
-from ..objects.attributes import ONLY_DRAWN, STORABLE, own_positions, read_attribute, type_of, write_attribute
+from ..objects.attributes import ONLY_DRAWN, STORABLE, read_attribute, type_of, write_attribute
 from ..objects.colors import own_colors
 from ..objects.groups import add_group, has_group
 from ..objects.place import LAS, OFFSET, place_of
 from ..objects.reading import seen_positions
 from .columns import RENAMED, Column, doubted_columns, known_digits, read_columns, remember_columns
 
-INPUTS = (*READABLE, *SPLATS, ".blend")
-OUTPUTS = (".blend", *WRITABLE, ".npz")
 _LONGEST_NAME = 60  # bytes; Blender's own limit is little above
 _PART = 5  # of them for the suffix of the second part of a column
 
@@ -206,39 +201,13 @@ def group_of(obj, name):
     return add_group(obj, f"{name} (column)", weights).name
 
 
-def faces_of(obj):
-    """Return the faces of an object, with the orientation that they have in the world.
-
-    Returns
-    -------
-    list of ndarray, (m, k) int32
-        One for each number k of corners.
-    """
-    mesh = obj.data
-    corners = np.empty(len(mesh.loops), np.int32)
-    starts, counts = np.empty((2, len(mesh.polygons)), np.int32)
-    mesh.loops.foreach_get("vertex_index", corners)
-    mesh.polygons.foreach_get("loop_start", starts)
-    mesh.polygons.foreach_get("loop_total", counts)
-    order = -1 if obj.matrix_world.determinant() < 0.0 else 1
-    return [
-        corners[starts[counts == count, None] + np.arange(count)][:, ::order] for count in np.unique(counts).tolist()
-    ]
-
-
-def file_points(obj):
-    """Return the points of an object in world space without the import offset, (n, 3) float64."""
-    matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
-    return own_positions(obj.data).astype(np.float64) @ matrix.T + place_of(obj)
-
-
-def attribute_arrays(obj):
-    """Return the points in world space, and the attributes of this extension by name without lb_."""
-    arrays = {"points": file_points(obj)}
-    for attribute in obj.data.attributes:
-        if attribute.name.startswith(PREFIX) and attribute.name not in ONLY_DRAWN:
-            arrays[attribute.name.removeprefix(PREFIX)] = read_attribute(obj.data, attribute.name)
-    for name, values in obj.items():
-        if name.startswith(PREFIX) and not isinstance(values, str):
-            arrays[name.removeprefix(PREFIX)] = np.array(values)
-    return arrays
+def faces_to(mesh, faces):
+    """Give a mesh of loose vertices faces, arrays (m, k) of their numbers, shaded smooth."""
+    corners = np.concatenate([each.reshape(-1) for each in faces])
+    sizes = np.concatenate([np.full(len(each), each.shape[1]) for each in faces])
+    mesh.loops.add(len(corners))
+    mesh.loops.foreach_set("vertex_index", corners.astype(np.int32))
+    mesh.polygons.add(len(sizes))
+    mesh.polygons.foreach_set("loop_start", (np.cumsum(sizes) - sizes).astype(np.int32))
+    mesh.polygons.foreach_set("use_smooth", np.ones(len(sizes), dtype=bool))
+    mesh.update(calc_edges=True)

@@ -127,10 +127,11 @@ def splats_to_write(obj):
 
 def splats_in_world(objects):
     """Return the displayed splats of objects, in world space without offsets, with the other data of their files."""
-    return core.splats.joined([_placed(obj) for obj in objects])
+    return core.splats.joined([placed_splats(obj) for obj in objects])
 
 
-def _placed(obj):
+def placed_splats(obj):
+    """Return the displayed splats of an object, likewise."""
     splats = _with_file(obj)
     matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
     maps = np.broadcast_to(matrix, (len(splats), 3, 3))

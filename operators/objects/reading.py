@@ -121,7 +121,8 @@ class Reading:
 
 
 def _units(vectors):
-    return vectors / np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None]
+    length = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None]
+    return vectors / np.where(length > 0.0, length, 1.0)
 
 
 def read_points(context, obj) -> Reading:
@@ -132,24 +133,36 @@ def read_points(context, obj) -> Reading:
     PointCloudError
         The points cannot be read or used; the text says what to do.
     """
-    positions = seen_positions(context, obj)
+    positions, matrix = seen_positions(context, obj), checked_matrix(obj)
+    judged = obj.meshfree.leave_out_floaters and has_splats(obj.data)
+    splats = read_splats(obj.data, with_harmonics=False) if judged else None
+    reading = Reading(
+        core.check_points(positions) @ matrix.T, matrix, boundary_points(obj), reading_notices(obj), splats=splats
+    )
+    sides = chosen_sides(obj)
+    return reading if sides is None else replace(reading, orientation=reading.placed_normals(sides))
+
+
+def checked_matrix(obj):
+    """Return the linear part of an object's matrix, (3, 3) float64, which must not be flat."""
     matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
     if not np.linalg.cond(matrix) < 1e6:
         raise PointCloudError(
-            f'"{obj.name}" is scaled to nothing along an axis, so its {len(positions)} points have no area.'
+            f'"{obj.name}" is scaled to nothing along an axis, so its {point_count(obj.data)} points have no area.'
             " Give it a scale above zero along each axis."
         )
+    return matrix
+
+
+def reading_notices(obj) -> list:
+    """Return notices about how an object is read."""
     notices = []
     if obj.type == "MESH" and obj.data.polygons:
         faces = len(obj.data.polygons)
         notices.append(f"The mesh has {faces} faces: only its {point_count(obj.data)} vertices are used.")
     if are_left_behind(obj.data):
         notices.append(f"{obj.name}: {LEFT_BEHIND}.")
-    judged = obj.meshfree.leave_out_floaters and has_splats(obj.data)
-    splats = read_splats(obj.data, with_harmonics=False) if judged else None
-    reading = Reading(core.check_points(positions) @ matrix.T, matrix, boundary_points(obj), notices, splats=splats)
-    sides = chosen_sides(obj)
-    return reading if sides is None else replace(reading, orientation=reading.placed_normals(sides))
+    return notices
 
 
 def chosen_sides(obj):

@@ -5,7 +5,7 @@ import zlib
 import bpy
 import numpy as np
 
-from ...command.quantities import AREA, EIGENVECTOR, NORMAL, RESULTS, eigenvector_name
+from ...command.quantities import AREA, EIGENVALUES, EIGENVECTOR, NORMAL, RESULTS, eigenvector_name
 from ...core import PointCloudError
 from .attributes import (
     ORIENTATION,
@@ -21,7 +21,6 @@ from .reading import chosen_sides, fingerprint, metric, sharing_objects
 
 _DIGITS = 3  # that scans justify
 _LEAST = 1e-3  # share of an area in doubt that is told
-EIGENVALUES = "lb_eigenvalues"  # custom property of the object, float64
 
 
 def check_writable(obj, names, make_single_user: bool, among=()):
@@ -104,13 +103,19 @@ def _note_analysis(obj, analysis, settings):
     kept.subset_count = analysis.subset_count
     for name, count in analysis.counts.items():
         setattr(kept, name, count)
-    kept.stages.clear()
-    for name, seconds in analysis.seconds.items():
-        stage = kept.stages.add()
-        stage.name, stage.seconds = name, seconds
+    note_stages(obj, analysis.seconds)
     kept.fingerprint = fingerprint(obj)
     kept.metric = metric(obj).reshape(-1)
     kept.settings_used = settings
+
+
+def note_stages(obj, times):
+    """Keep the seconds of the stages of an analysis on an object."""
+    stages = obj.meshfree.stages
+    stages.clear()
+    for name, seconds in times.items():
+        stage = stages.add()
+        stage.name, stage.seconds = name, seconds
 
 
 def is_trusted(result) -> bool:

@@ -197,4 +197,4 @@ class MESHFREE_OT_auto_weights(AutoWeights, ApplicationOperator, bpy.types.Opera
         return super().obstacle(context)
 
 
-TOOLS = (Registration(MESHFREE_OT_auto_weights, panel=Row("Rig", 1, 1), menu=Row("Object", 8, 11), verb=AutoWeights),)
+TOOLS = (Registration(MESHFREE_OT_auto_weights, panel=Row("Rig", 1, 1), menu=Row("Object", 8, 11)),)

@@ -236,6 +236,4 @@ class MESHFREE_OT_smooth_weights(SmoothWeights, WeightOperator, bpy.types.Operat
         return super().invoke(context, event)
 
 
-TOOLS = (
-    Registration(MESHFREE_OT_smooth_weights, panel=Row("Rig", 2, 1), menu=Row("Object", 8, 13), verb=SmoothWeights),
-)
+TOOLS = (Registration(MESHFREE_OT_smooth_weights, panel=Row("Rig", 2, 1), menu=Row("Object", 8, 13)),)

@@ -184,6 +184,5 @@ TOOLS = (
         MESHFREE_OT_transfer_attributes,
         panel=Row("Measure", 5, 3),
         menu=Row("Object", 2, 6),
-        verb=TransferAttributes,
     ),
 )

@@ -241,6 +241,4 @@ class MESHFREE_OT_transfer_weights(TransferWeights, TransferOperator, bpy.types.
         return "No selected object has weights. Select a rigged one, too, or run Automatic Weights"
 
 
-TOOLS = (
-    Registration(MESHFREE_OT_transfer_weights, panel=Row("Rig", 3, 1), menu=Row("Object", 8, 14), verb=TransferWeights),
-)
+TOOLS = (Registration(MESHFREE_OT_transfer_weights, panel=Row("Rig", 3, 1), menu=Row("Object", 8, 14)),)

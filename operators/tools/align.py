@@ -151,4 +151,4 @@ class MESHFREE_OT_align_points(Align, ShownOperator, bpy.types.Operator):
         return obstacle(other)
 
 
-TOOLS = (Registration(MESHFREE_OT_align_points, panel=Row("Measure", 5, 1), menu=Row("Object", 2, 3), verb=Align),)
+TOOLS = (Registration(MESHFREE_OT_align_points, panel=Row("Measure", 5, 1), menu=Row("Object", 2, 3)),)

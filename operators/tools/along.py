@@ -126,14 +126,10 @@ class SignedDistance(Tool):
     )
 
     def plan(self, context, obj):
-        places, closed = self.read_curve(context, obj)
+        places, closed = read_curve(context, self.curve)
+        places = places - np.array(obj.matrix_world.translation)  # as points are read
         _, operator = operator_reader(context, obj)
         return lambda progress: along.beside_curve(operator(progress), places, closed, cache, progress)
-
-    def read_curve(self, context, obj):
-        """Return the points of the curve, (k, 3), relative to the object's location, and whether it is closed."""
-        places, closed = _read_curve(context, self.curve)
-        return places - np.array(obj.matrix_world.translation), closed  # as points are read
 
     def write(self, context, obj, result):
         told = along.told_sides(result, obj.name, length_text)
@@ -149,7 +145,7 @@ class MESHFREE_OT_signed_distance(SignedDistance, ShownOperator, bpy.types.Opera
     bl_label = "Signed Distance"
 
 
-def _read_curve(context, name):
+def read_curve(context, name):
     """Read the points of a curve object in the world, (k, 3), and whether its last one is joined with the first."""
     curve = context.scene.objects.get(name)
     if curve is None or curve.type != "CURVE":
@@ -174,12 +170,8 @@ def _read_curve(context, name):
 
 
 TOOLS = (
-    Registration(MESHFREE_OT_nearest_source, panel=Row("Measure", 3, 1), menu=Row("Object", 7, 2), verb=NearestSource),
-    Registration(MESHFREE_OT_unwrap, panel=Row("Measure", 3, 2), menu=Row("Object", 7, 3), verb=Unwrap),
-    Registration(
-        MESHFREE_OT_extend_direction, panel=Row("Measure", 3, 3), menu=Row("Object", 7, 4), verb=ExtendDirection
-    ),
-    Registration(
-        MESHFREE_OT_signed_distance, panel=Row("Measure", 2, 2), menu=Row("Object", 7, 1), verb=SignedDistance
-    ),
+    Registration(MESHFREE_OT_nearest_source, panel=Row("Measure", 3, 1), menu=Row("Object", 7, 2)),
+    Registration(MESHFREE_OT_unwrap, panel=Row("Measure", 3, 2), menu=Row("Object", 7, 3)),
+    Registration(MESHFREE_OT_extend_direction, panel=Row("Measure", 3, 3), menu=Row("Object", 7, 4)),
+    Registration(MESHFREE_OT_signed_distance, panel=Row("Measure", 2, 2), menu=Row("Object", 7, 1)),
 )

@@ -220,7 +220,6 @@ TOOLS = (
         MESHFREE_OT_stray_points,
         panel=Row("Clean", 1, 1),
         menu=Row("Object", 4, 3),
-        verb=StrayPoints,
     ),
     Registration(MESHFREE_OT_select_strays, menu=Row("Points", 1, 7)),
     Registration(MESHFREE_OT_select_left_out, menu=Row("Points", 1, 8)),

@@ -179,6 +179,6 @@ def _compared(context):
 
 
 TOOLS = (
-    Registration(MESHFREE_OT_compare, panel=Row("Measure", 5, 2), menu=Row("Object", 2, 4), verb=Compare),
+    Registration(MESHFREE_OT_compare, panel=Row("Measure", 5, 2), menu=Row("Object", 2, 4)),
     Registration(MESHFREE_OT_compare_swap, menu=Row("Object", 2, 5)),
 )

@@ -125,7 +125,6 @@ TOOLS = (
         panel=Row("Measure", 1, 1),
         menu=Row("Object", 3, 1),
         quick=Row("Object", 1, 3, "Curvature"),
-        verb=Curvatures,
     ),
-    Registration(MESHFREE_OT_roughness, panel=Row("Measure", 1, 2), menu=Row("Object", 3, 2), verb=Roughness),
+    Registration(MESHFREE_OT_roughness, panel=Row("Measure", 1, 2), menu=Row("Object", 3, 2)),
 )

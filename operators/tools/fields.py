@@ -118,8 +118,6 @@ class MESHFREE_OT_geodesic_distance(GeodesicDistance, ShownOperator, bpy.types.O
 
 
 TOOLS = (
-    Registration(MESHFREE_OT_harmonic_field, panel=Row("Measure", 2, 3), menu=Row("Object", 6, 2), verb=HarmonicField),
-    Registration(
-        MESHFREE_OT_geodesic_distance, panel=Row("Measure", 2, 1), menu=Row("Object", 6, 1), verb=GeodesicDistance
-    ),
+    Registration(MESHFREE_OT_harmonic_field, panel=Row("Measure", 2, 3), menu=Row("Object", 6, 2)),
+    Registration(MESHFREE_OT_geodesic_distance, panel=Row("Measure", 2, 1), menu=Row("Object", 6, 1)),
 )

@@ -78,6 +78,4 @@ def _numbers(obj, name):
     return values
 
 
-TOOLS = (
-    Registration(MESHFREE_OT_measure_parts, panel=Row("Measure", 6, 1), menu=Row("Object", 3, 5), verb=MeasureParts),
-)
+TOOLS = (Registration(MESHFREE_OT_measure_parts, panel=Row("Measure", 6, 1), menu=Row("Object", 3, 5)),)

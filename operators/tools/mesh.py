@@ -211,4 +211,4 @@ def _close(mesh, most):
     return opened
 
 
-TOOLS = (Registration(MESHFREE_OT_mesh_surface, panel=Row("Mesh", 1, 1), menu=Row("Object", 2, 1), verb=MeshSurface),)
+TOOLS = (Registration(MESHFREE_OT_mesh_surface, panel=Row("Mesh", 1, 1), menu=Row("Object", 2, 1)),)

@@ -69,8 +69,4 @@ class MESHFREE_OT_minimal_surface(MinimalSurface, ApplicationOperator, bpy.types
     bl_label = "Minimal Surface"
 
 
-TOOLS = (
-    Registration(
-        MESHFREE_OT_minimal_surface, panel=Row("Minimal Surface", 1, 1), menu=Row("Object", 11, 1), verb=MinimalSurface
-    ),
-)
+TOOLS = (Registration(MESHFREE_OT_minimal_surface, panel=Row("Minimal Surface", 1, 1), menu=Row("Object", 11, 1)),)

@@ -121,6 +121,4 @@ def _vectors(obj, name):
     return vectors
 
 
-TOOLS = (
-    Registration(MESHFREE_OT_orient_normals, panel=Row("Clean", 2, 2), menu=Row("Object", 3, 3), verb=OrientNormals),
-)
+TOOLS = (Registration(MESHFREE_OT_orient_normals, panel=Row("Clean", 2, 2), menu=Row("Object", 3, 3)),)

@@ -97,6 +97,4 @@ def _values(obj, name):
     return read_attribute(obj.data, name)
 
 
-TOOLS = (
-    Registration(MESHFREE_OT_profile, panel=Row("Points and Groups", 2, 3), menu=Row("Points", 2, 3), verb=Profile),
-)
+TOOLS = (Registration(MESHFREE_OT_profile, panel=Row("Points and Groups", 2, 3), menu=Row("Points", 2, 3)),)

@@ -68,6 +68,4 @@ class MESHFREE_OT_cross_section(CrossSection, ApplicationOperator, bpy.types.Ope
     only_active = keeps_line = True
 
 
-TOOLS = (
-    Registration(MESHFREE_OT_cross_section, panel=Row("Measure", 6, 2), menu=Row("Object", 7, 5), verb=CrossSection),
-)
+TOOLS = (Registration(MESHFREE_OT_cross_section, panel=Row("Measure", 6, 2), menu=Row("Object", 7, 5)),)

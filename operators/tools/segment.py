@@ -186,8 +186,7 @@ TOOLS = (
         panel=Row("Segment", 1, 1),
         menu=Row("Object", 5, 1),
         quick=Row("Object", 1, 2, "Segment"),
-        verb=Segment,
     ),
     Registration(MESHFREE_OT_separate_by_segment, panel=Row("Segment", 1, 2), menu=Row("Object", 5, 2)),
-    Registration(MESHFREE_OT_signature, panel=Row("Measure", 4, 1), menu=Row("Object", 5, 3), verb=Signature),
+    Registration(MESHFREE_OT_signature, panel=Row("Measure", 4, 1), menu=Row("Object", 5, 3)),
 )

@@ -274,4 +274,4 @@ class MESHFREE_OT_simulate(Simulate, ShownOperator, bpy.types.Operator):
             )
 
 
-TOOLS = (Registration(MESHFREE_OT_simulate, panel=Row("Simulate", 1, 1), menu=Row("Object", 6, 3), verb=Simulate),)
+TOOLS = (Registration(MESHFREE_OT_simulate, panel=Row("Simulate", 1, 1), menu=Row("Object", 6, 3)),)

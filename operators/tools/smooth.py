@@ -175,7 +175,6 @@ TOOLS = (
         panel=Row("Clean", 2, 1),
         menu=Row("Object", 4, 1),
         quick=Row("Object", 1, 1, "Clean"),
-        verb=Smooth,
     ),
-    Registration(MESHFREE_OT_mode_shape, panel=Row("Spectrum", 1, 1), menu=Row("Object", 4, 2), verb=ModeShape),
+    Registration(MESHFREE_OT_mode_shape, panel=Row("Spectrum", 1, 1), menu=Row("Object", 4, 2)),
 )

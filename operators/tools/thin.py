@@ -64,4 +64,4 @@ class MESHFREE_OT_thin_out(ThinOut, ApplicationOperator, bpy.types.Operator):
     keeps_line = True
 
 
-TOOLS = (Registration(MESHFREE_OT_thin_out, panel=Row("Clean", 1, 2), menu=Row("Object", 4, 4), verb=ThinOut),)
+TOOLS = (Registration(MESHFREE_OT_thin_out, panel=Row("Clean", 1, 2), menu=Row("Object", 4, 4)),)

@@ -38,8 +38,4 @@ class MESHFREE_OT_surface_variation(SurfaceVariation, ShownOperator, bpy.types.O
     bl_label = "Surface Variation"
 
 
-TOOLS = (
-    Registration(
-        MESHFREE_OT_surface_variation, panel=Row("Measure", 1, 3), menu=Row("Object", 3, 4), verb=SurfaceVariation
-    ),
-)
+TOOLS = (Registration(MESHFREE_OT_surface_variation, panel=Row("Measure", 1, 3), menu=Row("Object", 3, 4)),)
