@@ -6,6 +6,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
 from ...command.clouds import Kind, positions
 from ...command.colors import COLOR
@@ -98,7 +99,7 @@ class Owner:
         if self.kept is not None and not self.kept.all():
             keep_points(bpy.context, obj, self.kept)
         elif self.motion is not None:
-            move_object(obj, _shifted(self.motion, offset_of(obj)) @ np.array(obj.matrix_world))
+            move_object(obj, Matrix(_shifted(self.motion, offset_of(obj)) @ np.array(obj.matrix_world)))
             bpy.context.view_layer.update()
         elif moves:
             self._move(given)
@@ -110,7 +111,7 @@ class Owner:
             # As a list: Blender writes an array into the memory of the one before, whatever the length of that.
             obj[name] = values.tolist()
         tag_changed(obj.data)
-        shown = [name for name in results if quantity(name).attribute and name not in RESULTS]
+        shown = [NORMAL] if ORIENTATION in results else [] if _is_analysis(results) else results
         self._show([*changed, *shown, *APPLICATIONS, MEAN_CURVATURE])
         return []
 
@@ -167,15 +168,17 @@ class Owner:
         """Write results, of which those of an analysis count as one of the object."""
         obj = self.obj
         local = {name: self._local_values(name, values) for name, values in results.items()}
-        if set(RESULTS) <= results.keys():
+        if _is_analysis(results):
             measures = {name: results[name] for name in RESULTS}
             found = Analysis(None, measures, local[NORMAL], None, 0, {}, [])
             write_result(obj, found, 0, oriented=ORIENTATION in results)
         prefixes = [quantity(name).attribute for name in results if quantity(name).numbered]
         for prefix in dict.fromkeys(prefixes):
             remove_numbered(obj.data, prefix, beyond=prefixes.count(prefix))
-        for name in results.keys() - {*RESULTS, ORIENTATION} if set(RESULTS) <= results.keys() else results:
-            write_attribute(obj.data, name, local[name])
+        known = {*RESULTS, ORIENTATION} if _is_analysis(results) else ()
+        for name in results:
+            if name not in known:
+                write_attribute(obj.data, name, local[name])
 
     def _show(self, names):
         """Show the first of some attributes that is there, or else the colors of the points."""
@@ -234,6 +237,10 @@ class Owner:
         """Return the points of a curve object, (k, 3), and whether it is closed."""
         places, closed = read_curve(bpy.context, name)
         return places + offset_of(self.obj), closed
+
+
+def _is_analysis(results) -> bool:
+    return results.keys() >= {*RESULTS}
 
 
 def _linear(obj):

@@ -7,9 +7,8 @@ import pytest
 from tests.blender.armatures import weights_of
 from tests.blender.clouds import add_object, sphere_points
 from tests.blender.conftest import part
-from tests.blender.test_command import run  # noqa: F401
+from tests.blender.test_command import run, write  # noqa: F401
 from tests.blender.test_transfer_weights import BONES, height, positions
-from tests.blender.test_verbs import write
 
 pytestmark = pytest.mark.any_blender
 
@@ -50,14 +49,3 @@ def test_files_without_weights_fail(run, rigged, tmp_path):  # noqa: F811
     assert code == 1
     assert "No point of" in line["error"]
     assert run("transfer-weights", plain, "--reference", rigged, "--out", tmp_path / "a.ply")[0] == 2
-
-
-def test_attributes(run, tmp_path):  # noqa: F811
-    points, again = sphere_points(900), sphere_points(500, seed=4)
-    given = write(tmp_path / "given.csv", points, heat=points[:, 2], part=(points[:, 0] > 0).astype(int))
-    code, [line] = run(
-        "transfer-attributes", write(tmp_path / "a.csv", again), "--reference", given, "--out", tmp_path / "a.ply"
-    )
-    assert code == 0, line
-    table = part("core.files").read_points(tmp_path / "a.ply")
-    assert np.abs(table.attributes["heat"] - again[:, 2]).max() < 0.02
