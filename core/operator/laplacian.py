@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from ..arguments import check_switches
+from ..arguments import check_switches, positive
 from ..errors import InvalidPointsError
 from ..frozen import Frozen
 from ..geometry import Agreed, Cloud, Doubt, arc_length, check_points, check_values, move_apart, read_cloud, toward
@@ -18,7 +19,8 @@ from ..options import LaplacianOptions, check_options
 from ..progress import ends_at_one
 from ..types import Bools, Floats, Ints, Progress, Report
 from .areas import NO_AREA, solve_areas
-from .spectrum import TOLERANCE, Spectrum, correct_eigenvalues, solve_spectrum
+from .kept import Kept
+from .spectrum import TOLERANCE, Spectrum, check_count, correct_eigenvalues, solve_spectrum
 from .stiffness import Stiffness, assemble_stiffness
 from .trust import doubt_notices, measure_trust
 
@@ -114,6 +116,31 @@ class LaplaceBeltrami(Frozen):
             f"<LaplaceBeltrami: {len(self.points)} points, {components} component{'' if components == 1 else 's'},"
             f" area {self.areas.sum():.6g}{f', {left_out} left out' if left_out else ''}>"
         )
+
+    @cached_property
+    def kept(self) -> Kept:
+        """What was computed of it and may be needed again: modes, factors, distances, a mesh."""
+        return Kept()
+
+    def release(self) -> None:
+        """Drop what was computed of the operator and is kept: its modes, factors, distances and mesh.
+
+        All of it is computed again when it is needed.
+
+        See Also
+        --------
+        LaplaceBeltrami.eigenpairs : Keeps the modes that it computed.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import meshfree_laplacian as mf
+        >>> points = mf.example_sphere()
+        >>> laplacian = mf.build_laplacian(points)
+        >>> spectrum = laplacian.eigenpairs(9)
+        >>> laplacian.release()
+        """
+        self.kept.clear()
 
     @property
     def quadric_mean_curvature(self) -> Floats:
@@ -249,6 +276,8 @@ class LaplaceBeltrami(Frozen):
     ) -> Spectrum:
         """Compute the lowest eigenpairs of the negated operator, eq. (12).
 
+        They are kept: as many or fewer are had at once the next time. `release` drops them.
+
         Parameters
         ----------
         count : int
@@ -297,10 +326,20 @@ class LaplaceBeltrami(Frozen):
         [0. 2. 2. 2. 6. 6. 6. 6. 6.]
         """
         check_switches(raw=raw, dirichlet=dirichlet)
-        stiffness = self.dirichlet[0] if dirichlet else self.stiffness
-        places = self.points, self.areas, self.component, self.smoothing_lengths
-        spectrum = solve_spectrum(stiffness, *places, count, tolerance, progress)
-        return spectrum if raw else self.corrected(spectrum)
+
+        def solve() -> Spectrum:
+            stiffness = self.dirichlet[0] if dirichlet else self.stiffness
+            places = self.points, self.areas, self.component, self.smoothing_lengths
+            return solve_spectrum(stiffness, *places, count, tolerance, progress)
+
+        def serves(solved_to: tuple[float, ...], found: Spectrum) -> bool:
+            return solved_to <= (tolerance,) and len(found.eigenvalues) >= count
+
+        check_count(count, len(self.points))
+        positive(tolerance, "tolerance of the modes")
+        found = self.kept.serving("Dirichlet modes" if dirichlet else "modes", solve, serves, (tolerance,))
+        lowest = found.lowest(int(count))
+        return lowest if raw else self.corrected(lowest)
 
     def corrected(self, spectrum: Spectrum) -> Spectrum:
         """Apply the symbol correction to the eigenvalues of a raw spectrum.

@@ -9,7 +9,7 @@ from scipy.sparse.linalg import ArpackNoConvergence
 from scipy.spatial import cKDTree
 
 from ..algebra import Rows, coarse_to_fine, lift_lowest
-from ..arguments import positive, whole
+from ..arguments import whole
 from ..cores import cores
 from ..errors import SolverError, TooFewPointsError, UnresolvedModesError
 from ..frozen import Frozen
@@ -44,6 +44,23 @@ class Spectrum(Frozen):
     eigenvectors: Floats
     residuals: Floats | None = None
 
+    def lowest(self, count: int) -> "Spectrum":
+        """Return the lowest of them alone."""
+        if count >= len(self.eigenvalues):
+            return self
+        residuals = None if self.residuals is None else self.residuals[:count]
+        return Spectrum(self.eigenvalues[:count], self.eigenvectors[:, :count], residuals)
+
+
+def check_count(count: int, points: int) -> None:
+    """Refuse a number of modes that a number of points does not carry."""
+    if not whole(count) >= 1:
+        raise TooFewPointsError(f"{count!r} modes were asked for. Ask for a whole number of at least 1.")
+    if count > points // 3:
+        raise TooFewPointsError(
+            f"{count} modes were asked for, but {points} points carry at most {points // 3}. Ask for fewer."
+        )
+
 
 def solve_spectrum(
     stiffness: sparse.csr_array,
@@ -57,11 +74,6 @@ def solve_spectrum(
 ) -> Spectrum:
     """Compute raw eigenpairs; see `LaplaceBeltrami.eigenpairs`."""
     n = len(areas)
-    if not whole(count) >= 1:
-        raise TooFewPointsError(f"{count!r} modes were asked for. Ask for a whole number of at least 1.")
-    if count > n // 3:
-        raise TooFewPointsError(f"{count} modes were asked for, but {n} points carry at most {n // 3}. Ask for fewer.")
-    positive(tolerance, "tolerance of the modes")
     check_mode_memory(n, int(count))
     count, done = int(count), 0.0
 

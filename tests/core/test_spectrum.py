@@ -155,6 +155,7 @@ def test_impossible_counts(laplacian, count):
 
 def test_progress_is_reported(laplacian):
     calls = []
+    laplacian.release()
     laplacian.eigenpairs(5, progress=lambda stage, fraction: calls.append((stage, fraction)))
     assert {stage for stage, _ in calls} == {"Spectrum"}
     assert all(0.0 <= fraction < 1.0 for _, fraction in calls[:-1])
@@ -244,6 +245,7 @@ def test_the_number_of_cores_does_not_matter(laplacian, spectrum, monkeypatch):
 
 def test_it_can_be_cancelled_at_any_report(laplacian):
     calls = []
+    laplacian.release()
     laplacian.eigenpairs(5, progress=lambda stage, fraction: calls.append(fraction))
     assert calls == sorted(calls)
     assert len(calls) > 20
@@ -255,5 +257,6 @@ def test_it_can_be_cancelled_at_any_report(laplacian):
             if next(left, None) is None:
                 raise core.Cancelled
 
+        laplacian.release()
         with pytest.raises(core.Cancelled):
             laplacian.eigenpairs(5, progress=stop)
