@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 
 import core
+from core.distance.geodesics import geodesics_of
+from core.distance.transport import transport_of
 
 from .accuracy import relative
 from .samplings import (
@@ -133,8 +135,8 @@ def along():
         near = points @ points[source] > -0.9
         laplacian = core.build_laplacian(points)
         began = time.process_time()
-        carried = core.distance.Transport(laplacian)
-        found, place = carried.extend([source], direction), carried.logarithmic_map(source, direction)
+        found = core.distance.transport(laplacian, [source], direction)
+        place = core.distance.logarithmic_map(laplacian, source, direction)
         seconds = time.process_time() - began
         yield from errors(found, place, exact(points, laplacian.normals[source], source, direction), near)
         yield seconds
@@ -180,16 +182,15 @@ def along_cost():
 
     def own(laplacian, others, curve):
         points = laplacian.points
-        seconds, carried = spend(core.distance.Transport, laplacian)
-        yield seconds
-        yield spend(carried.extend, [7], [0.3, -0.5, 0.8])[0]
-        yield spend(carried.logarithmic_map, 7)[0]
-        yield spend(carried.logarithmic_map, len(points) // 2)[0]
-        seconds, geodesics = spend(core.distance.Geodesics, laplacian)
-        yield seconds
-        yield spend(geodesics.distance, [7])[0]
-        yield spend(geodesics.nearest_source, others)[0]
-        yield spend(geodesics.signed_distance, curve, closed=True)[0]
+        yield spend(transport_of, laplacian)[0]
+        yield spend(core.distance.transport, laplacian, [7], [0.3, -0.5, 0.8])[0]
+        yield spend(core.distance.logarithmic_map, laplacian, 7)[0]
+        yield spend(core.distance.logarithmic_map, laplacian, len(points) // 2)[0]
+        laplacian.release()
+        yield spend(geodesics_of, laplacian)[0]
+        yield spend(core.distance.geodesic_distance, laplacian, [7])[0]
+        yield spend(core.distance.nearest_source, laplacian, others)[0]
+        yield spend(core.distance.signed_distance, laplacian, curve, closed=True)[0]
 
     def peer(points):
         seconds, solver = spend(potpourri3d.PointCloudHeatSolver, points)

@@ -21,6 +21,7 @@ from scipy.spatial import cKDTree
 
 import core
 from core.cores import cores
+from core.distance.geodesics import geodesics_of
 from core.geometry import cloud
 from core.operator import laplacian, stiffness
 
@@ -106,8 +107,8 @@ def run_applications(count):
     watch.run("smoothing", core.clean.smooth_points, built, core.clean.exponential(0.1))
     fixed = np.flatnonzero(low | high)
     watch.run("harmonic field", core.distance.harmonic_field, built, fixed, high[fixed].astype(float))
-    geodesics = watch.run("geodesics, set-up", core.distance.Geodesics, built)
-    watch.run("geodesics, a source", geodesics.distance, [0])
+    watch.run("geodesics, set-up", geodesics_of, built)
+    watch.run("geodesics, a source", core.distance.geodesic_distance, built, [0])
     watch.run("segmentation", core.spectral.segment, built, 6)
     watch.run("binding by a coarse cloud", core.deform.coarse_deformer, built, high, low)
     watch.run("binding", core.deform.Deformer, built, high, low)

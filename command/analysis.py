@@ -5,8 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import core
-from .quantities import AREA, BOUNDARY, COMPONENT, DOUBT, rows_of
+from . import core, quantities
 
 WRITE_LIMIT = 50  # default number of modes written as attributes: each takes 4 bytes per point in the file
 
@@ -30,7 +29,7 @@ class Built(NamedTuple):
     @property
     def measures(self) -> dict:
         """Results at the points, by the names of their attributes."""
-        return {row.attribute: row.of(self) for row in rows_of("analyze")}
+        return {row.attribute: row.of(self) for row in quantities.rows_of("analyze")}
 
 
 def build(points, options, boundary, left_out, progress) -> Built:
@@ -130,20 +129,20 @@ def continued(spectrum, areas, points, earlier):
 
 def total_area(measures) -> float:
     """Return the area of the whole surface."""
-    return float(measures[AREA].sum())
+    return float(measures[quantities.AREA].sum())
 
 
 def trusted_area(measures) -> float:
     """Return the area of the parts whose results are not in doubt."""
-    return float(measures[AREA][measures[DOUBT] == 0].sum())
+    return float(measures[quantities.AREA][measures[quantities.DOUBT] == 0].sum())
 
 
 def counts(measures) -> dict:
     """Return the numbers of components, boundary points and points left out."""
-    component = measures[COMPONENT]
+    component = measures[quantities.COMPONENT]
     return {
         "component_count": int(component.max()) + 1,
-        "boundary_count": int(np.count_nonzero(measures[BOUNDARY])),
+        "boundary_count": int(np.count_nonzero(measures[quantities.BOUNDARY])),
         "left_out_count": int(np.count_nonzero(component < 0)),
     }
 
@@ -151,7 +150,7 @@ def counts(measures) -> dict:
 def figures(measures, spectrum) -> dict:
     """Return what the command line prints of an analysis; `spectrum` may be None."""
     return {
-        "points": len(measures[AREA]),
+        "points": len(measures[quantities.AREA]),
         "total_area": total_area(measures),
         "trusted_area": trusted_area(measures),
         **counts(measures),
@@ -174,7 +173,7 @@ def arrays(place, built, spectrum) -> dict:
     laplacian, stiffness = built.laplacian, built.laplacian.stiffness
     return {
         "points": laplacian.points + place,
-        **{row.source.rpartition(".")[2]: row.of(built) for row in rows_of("analyze")},
+        **{row.source.rpartition(".")[2]: row.of(built) for row in quantities.rows_of("analyze")},
         "smoothing_lengths": laplacian.smoothing_lengths,
         "eigenvalues": np.empty(0) if spectrum is None else spectrum.eigenvalues,
         "eigenvectors": np.empty((len(laplacian.areas), 0)) if spectrum is None else spectrum.eigenvectors,

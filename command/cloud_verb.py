@@ -1,8 +1,7 @@
 """Verbs for clouds of files: what is read, and the Laplacian of it."""
 
-from . import analysis, clouds, core
+from . import analysis, clouds, core, quantities
 from .inputs import add_choices, files_in, las_choices
-from .quantities import ORIENTATION
 from .settings import LAPLACIAN, add_setting, chosen, laplacian_options
 from .stages import ToldStages
 from .verb import ONE_LINE, Verb
@@ -80,7 +79,7 @@ class SurfaceVerb(CloudVerb):
         """Return the operator of a cloud, by the values of the settings in `LAPLACIAN`."""
         boundary = self.boundary(cloud, values)
         built = analysis.build(cloud.points, laplacian_options(values), boundary, cloud.out, progress)
-        sides = cloud.columns.get(ORIENTATION)
+        sides = cloud.columns.get(quantities.ORIENTATION)
         return built if sides is None else analysis.oriented(built, sides)
 
 

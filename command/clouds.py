@@ -9,8 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from . import core
-from .quantities import NORMAL, ORIENTATION, PREFIX, quantity
+from . import core, quantities
 from .settings import as_place, place
 
 _FILE_NORMAL = "normal"  # the attribute that files call nx ny nz
@@ -216,7 +215,9 @@ def moved(given, points, matrix, place):
     columns = dict(given.attributes)
     turn = (linear / np.cbrt(np.linalg.det(linear))).T
     for name, values in columns.items():
-        if np.ndim(values) == 2 and (name in (_FILE_NORMAL, ORIENTATION) or quantity(name).is_direction):
+        if np.ndim(values) == 2 and (
+            name in (_FILE_NORMAL, quantities.ORIENTATION) or quantities.quantity(name).is_direction
+        ):
             columns[name] = values @ turn
     if np.ndim(columns.get(core.files.SCANNER)) == 2:
         # Relative to the points, whose own motion is known, so that no digits are lost far from the origin.
@@ -252,7 +253,7 @@ def write(path, given, results, arrays=None, numbers=None) -> list:
     splats = isinstance(given, core.splats.Splats)
     if path.suffix.lower() == ".npz":
         points = np.asarray(given.positions if splats else given.points, dtype=np.float64)
-        named = {name.removeprefix(PREFIX): values for name, values in (results | (numbers or {})).items()}
+        named = {name.removeprefix(quantities.PREFIX): values for name, values in (results | (numbers or {})).items()}
         save_arrays(path, {"points": points, **named} if arrays is None else arrays)
         return []
     if splats:
@@ -273,9 +274,9 @@ def with_results(given, results):
         By the names of attributes.
     """
     attributes = {**given.attributes, **{name: _narrow(values) for name, values in results.items()}}
-    if NORMAL in results:
+    if quantities.NORMAL in results:
         attributes.pop(_FILE_NORMAL, None)
-        attributes[_FILE_NORMAL] = attributes.pop(NORMAL)
+        attributes[_FILE_NORMAL] = attributes.pop(quantities.NORMAL)
     return replace(given, attributes=attributes)
 
 

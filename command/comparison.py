@@ -4,10 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import core
+from . import core, quantities
 from .alignment import check_found
 from .naming import naming
-from .quantities import COMPARED
 from .settings import Setting
 
 COMPARE = {
@@ -170,12 +169,12 @@ def _left_out(known, kept, other) -> list:
         beside -= strays
         notices.append(
             f"{strays:,} of {len(known):,} points are outliers or in small components, without a normal: they are not"
-            f" compared, and {COMPARED} is false there."
+            f" compared, and {quantities.COMPARED} is false there."
         )
     if beside:
         notices.append(
             f"{beside:,} of {len(known):,} points lie beside the surface of {other}, or too far from it: they are not"
-            f" compared, and {COMPARED} is false there."
+            f" compared, and {quantities.COMPARED} is false there."
         )
     return notices
 

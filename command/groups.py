@@ -2,51 +2,12 @@
 
 import numpy as np
 
-from . import core
+from . import core, tools
 from .clouds import kind_of
 from .settings import place
 
-HANDLE, ANCHOR, FIXED, SOURCE, LOW, HIGH, VALUE, BOUNDARY_GROUP = ROLES = (
-    "Handle",
-    "Anchor",
-    "Fixed",
-    "Source",
-    "Low",
-    "High",
-    "Value",
-    "Boundary",
-)
-
-
-def is_chosen(name: str, default: str, there: bool) -> bool:
-    """Whether a setting names a group that must exist: any but the default, which may not be there."""
-    return bool(name) and (there or name != default)
-
-
-def column_weights(values, name: str, where: str):
-    """Return the weights, (n,) float64, that a column of a file or an object holds.
-
-    Numbers from 0 to 1 are weights; of whole numbers all but 0 count.
-    """
-    if values.ndim > 1:
-        raise core.PointCloudError(f'The column "{name}" of {where} holds vectors. Name one with a number a point.')
-    weights = (values if values.dtype.kind == "f" else values.astype(bool)).astype(np.float64)
-    if not ((weights >= 0.0) & (weights <= 1.0)).all():
-        raise core.PointCloudError(
-            f'The column "{name}" of {where} has numbers that are not from 0 to 1, so they are no weights. Name'
-            " another, or let it hold 1 for the points of the group and 0 for others."
-        )
-    return weights
-
-
-def check_enough(weights, kind: str, name: str, setting: str, least: int = 1, how: str = ""):
-    """Refuse weights, (n,), of which fewer than a number are above zero; `how` the group of a kind gets more."""
-    count = np.count_nonzero(weights > 0.0)
-    if count < least:
-        raise core.PointCloudError(
-            f'The {kind} "{name}" gives {count} of {len(weights)} points a weight above zero, and {setting}'
-            f" takes at least {least}. Assign points to it{how}, or clear {setting}."
-        )
+FIXED, SOURCE, LOW, HIGH, VALUE = (getattr(tools.groups, name) for name in ("FIXED", "SOURCE", "LOW", "HIGH", "VALUE"))
+is_chosen, column_weights, check_enough = tools.groups.is_chosen, tools.groups.column_weights, tools.groups.check_enough
 
 
 def read_weights(cloud, name: str, option: str, least: int = 1, outside: float = 0.0):
@@ -94,9 +55,3 @@ def read_sources(cloud, arguments):
 def nearest_to(cloud, places):
     """Return the points of a cloud that are nearest to places in the coordinates of its file, (k,) int."""
     return core.geometry.nearest_rows(cloud.points, np.asarray(places) - cloud.place)
-
-
-def unreached(reached, name: str, consequence: str) -> list:
-    """Return a notice of the points of some cloud that no source reaches, given those that one does, (n,) bool."""
-    missed = np.count_nonzero(~reached)
-    return [f"{missed:,} points of {name} are reached by no source. {consequence}"] if missed else []

@@ -214,7 +214,7 @@ def _pulse(laplacian, chosen, rows, cache, progress):
     if not len(rows):
         return None
     width = _width(laplacian, chosen)
-    away = cache.geodesics(laplacian, progress).distance(rows, limit=_FAR * width, progress=progress)
+    away = core.distance.geodesic_distance(laplacian, rows, limit=_FAR * width, progress=progress)
     return np.exp(-((away / width) ** 2))
 
 
@@ -283,10 +283,10 @@ def _front(laplacian, chosen, cache, progress):
 
     A front arrives where the time of a touch and that of the way from there, together, are the least of all touches.
     """
-    geodesics, width = cache.geodesics(laplacian, progress), _width(laplacian, chosen)
+    width = _width(laplacian, chosen)
     arrival = np.full(len(laplacian.points), np.inf)  # how far the front has travelled by then
     if chosen.touched is None:
-        arrival = geodesics.distance(chosen.sources, progress=progress)
+        arrival = core.distance.geodesic_distance(laplacian, chosen.sources, progress=progress)
         far = chosen.distance or float(arrival[np.isfinite(arrival)].max())
     else:
         far = _reach(laplacian, chosen)
@@ -299,7 +299,7 @@ def _front(laplacian, chosen, cache, progress):
             rows = rows[arrival[rows] > travelled]  # others are behind the front, which adds nothing
             if len(rows):
                 left = max(last - travelled, 0.0) + width
-                away = geodesics.distance(rows, limit=left, progress=progress)
+                away = core.distance.geodesic_distance(laplacian, rows, limit=left, progress=progress)
                 np.minimum(arrival, travelled + away, out=arrival)
             yield np.clip(1.0 + (travelled - arrival) / width, 0.0, 1.0)
             number += 1

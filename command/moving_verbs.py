@@ -1,61 +1,12 @@
 """Verbs that move points, and splats with them."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
-from . import clouds, core, minimal, smoothing, uncached
+from . import clouds, core, minimal
 from .cloud_verb import SurfaceVerb, floaters
 from .groups import is_chosen, read_weights
 from .results import number_text
 from .settings import LAPLACIAN, chosen, default_options
-
-
-class MovingVerb(SurfaceVerb):
-    """A verb that moves points by their operator; `moved` of a subclass returns where to, and a line on that."""
-
-    def work(self, path, given, arguments, output, progress):
-        cloud = clouds.Cloud(path, given, floaters(arguments))
-        own = SimpleNamespace(**chosen(self.settings, arguments))
-        wanted = self.wanted(cloud, own)
-        laplacian = self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress).laplacian
-        points, line = self.moved(laplacian, wanted, path.stem, own, progress)
-        written = [] if output is None else _write(output, cloud, points, laplacian)
-        return {"points": len(points), "done": line}, [*laplacian.notices, *written]
-
-    def wanted(self, cloud, own):
-        """Return what the motion needs of a cloud beside its points, read before anything is computed."""
-        return None
-
-    def moved(self, laplacian, wanted, name, own, progress):
-        """Return the points, (n, 3), and a line on them, of a cloud of some name, by the values of the settings."""
-        raise NotImplementedError
-
-
-class Smooth(MovingVerb):
-    """The verb `smooth`."""
-
-    name = "smooth"
-    help = "smooth the shape of the points: remove noise, soften details, keep a few modes, or strengthen details"
-    settings = tuple(smoothing.SMOOTH.values())
-
-    def wanted(self, cloud, own):
-        return read_weights(cloud, own.group, "--group") if own.group else None
-
-    def moved(self, laplacian, wanted, name, own, progress):
-        points, _ = smoothing.smoothed(laplacian, own, wanted, name, uncached, progress)
-        return points, smoothing.smooth_line(laplacian.points, points, name, number_text)
-
-
-class ModeShape(MovingVerb):
-    """The verb `mode-shape`."""
-
-    name = "mode-shape"
-    help = "displace the points along their normals by a vibration mode"
-    settings = tuple(smoothing.MODE_SHAPE.values())
-
-    def moved(self, laplacian, wanted, name, own, progress):
-        points = smoothing.by_mode(laplacian, own.mode, own.amplitude, own.phase, uncached, progress)
-        return points, smoothing.mode_line(laplacian.points, points, own.mode, name, number_text)
 
 
 class MinimalSurface(SurfaceVerb):
@@ -79,13 +30,13 @@ class MinimalSurface(SurfaceVerb):
         film = minimal.shrink(cloud.points, fixed, own["tolerance"], own["steps"], default_options(values), progress)
         written = []
         if output is not None:
-            written = _write(output, cloud, film.points, laplacian, {minimal.HISTORY: film.area_history})
+            written = write_moved(output, cloud, film.points, laplacian, {minimal.HISTORY: film.area_history})
         line = minimal.film_line(film, path.stem, number_text)
         told = [] if laplacian is None else laplacian.notices
         return {"points": len(film.points), "done": line}, [*told, *film.notices, *written]
 
 
-def _write(output, cloud, points, laplacian, numbers=None) -> list:
+def write_moved(output, cloud, points, laplacian, numbers=None) -> list:
     """Write a cloud whose points have moved, with further numbers as of `clouds.write`; return notices.
 
     Splats are deformed by the gradients that their operator gives.

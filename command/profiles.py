@@ -65,9 +65,7 @@ def path_between(laplacian, ends, cache, progress):
         laplacian,
         "path",
         ends,
-        compute=lambda: core.distance.geodesic_path(
-            laplacian, *ends.tolist(), geodesics=cache.geodesics(laplacian, progress)
-        ),
+        compute=lambda: core.distance.geodesic_path(laplacian, *ends.tolist(), progress=progress),
     )
 
 

@@ -6,10 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from . import alignment, clouds, colors, comparison, core, transferring
+from . import alignment, clouds, colors, comparison, core, quantities, transferring
 from .cloud_verb import CloudVerb, SurfaceVerb, floaters
 from .naming import naming
-from .quantities import COMPARED, ORIENTATION, TRANSFER, quantity, written_by
 from .results import number_text
 from .settings import LAPLACIAN, chosen
 
@@ -66,7 +65,7 @@ class Align(WithReference):
         alignment.check_found(found, path.stem, reference.stem)
         written = []
         if output is not None:
-            [residual] = written_by(self.operator)
+            [residual] = quantities.written_by(self.operator)
             moved = clouds.moved(given, cloud.points + shift, found.matrix, target.place)
             written = clouds.write(output, moved, {residual: found.residual})
         half = f"half of them within {alignment.middle(found):.4g}"
@@ -113,9 +112,11 @@ class Compare(ReferenceVerb):
         own, shift = SimpleNamespace(**chosen(self.settings, arguments)), cloud.place - target.place
 
         def build(progress):
-            return comparison.Sided(self.build(cloud, values, progress).laplacian, cloud.columns.get(ORIENTATION))
+            return comparison.Sided(
+                self.build(cloud, values, progress).laplacian, cloud.columns.get(quantities.ORIENTATION)
+            )
 
-        other = comparison.Sided(laplacian, target.columns.get(ORIENTATION))
+        other = comparison.Sided(laplacian, target.columns.get(quantities.ORIENTATION))
         names = path.stem, reference.name
         found, aligned, told = comparison.compared(
             cloud.points + shift, build, lambda _: other, own, names, "", progress
@@ -125,8 +126,8 @@ class Compare(ReferenceVerb):
             moved = given
             if aligned is not None:
                 moved = clouds.moved(given, cloud.points + shift, aligned.matrix, target.place)
-            [deviation] = written_by(self.operator)
-            told += clouds.write(output, moved, {deviation: found.distance, COMPARED: found.known})
+            [deviation] = quantities.written_by(self.operator)
+            told += clouds.write(output, moved, {deviation: found.distance, quantities.COMPARED: found.known})
         line = comparison.line(found, path.stem, reference.name, number_text)
         return {"points": len(cloud.points), "done": line, **comparison.figures(found)}, told
 
@@ -169,12 +170,12 @@ def _values(cloud, own):
 
 def _is_smooth(name, column):
     """Whether numbers are averaged: those that are no labels."""
-    return column.dtype.kind == "f" and quantity(name).carried != "label"
+    return column.dtype.kind == "f" and quantities.quantity(name).carried != "label"
 
 
 def _write_taken(output, cloud, new, state):
     """Write a cloud with what it has taken, by name; return notices."""
-    given, tint, state = cloud.given, new.pop(colors.COLOR, None), {TRANSFER: state}
+    given, tint, state = cloud.given, new.pop(colors.COLOR, None), {quantities.TRANSFER: state}
     if output.suffix.lower() == ".npz":
         return clouds.write(output, given, {**new, **state} | ({} if tint is None else {"colors": colors.srgb(tint)}))
     if cloud.splats is not None:

@@ -4,11 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from . import analysis, clouds, core, fields, orienting, results, segmenting, uncached
+from . import analysis, clouds, orienting, quantities
 from .cloud_verb import SurfaceVerb, floaters
-from .groups import read_weights
-from .quantities import NORMAL, ORIENTATION, rows_of
-from .results import Told, number_text
+from .results import Told
 from .settings import LAPLACIAN, chosen
 
 
@@ -51,95 +49,8 @@ class ResultVerb(SurfaceVerb):
 
     def named(self, told) -> Told:
         """Return what a tool tells with its only result by the name of its attribute."""
-        [row] = rows_of(self.operator)
+        [row] = quantities.rows_of(self.operator)
         return told._replace(values={row.attribute: told.values})
-
-
-class PrincipalCurvatures(ResultVerb):
-    """The verb `principal-curvatures`."""
-
-    name, operator = "principal-curvatures", "principal_curvatures"
-    help = "compute principal curvatures and directions, shape index and curvedness"
-
-    def compute(self, built, wanted, name, own, progress):
-        found = core.measure.principal_curvatures(built.laplacian)
-        values = {row.attribute: row.of(found) for row in rows_of(self.operator)}
-        return Told(values, found.notices, f"{name}: {results.curvature_line(found)}")
-
-
-class SurfaceVariation(ResultVerb):
-    """The verb `surface-variation`."""
-
-    name, operator = "surface-variation", "surface_variation"
-    help = "measure how far the neighborhood of each point is from a plane: edges, corners and noise are large"
-
-    def compute(self, built, wanted, name, own, progress):
-        found = core.measure.surface_variation(built.laplacian)
-        return self.named(Told(found, [], f"{name}: {results.variation_line(found)}"))
-
-
-class Roughness(ResultVerb):
-    """The verb `roughness`."""
-
-    name = operator = "roughness"
-    help = "measure the signed height of points above the smoothed surface"
-    settings = tuple(results.ROUGHNESS.values())
-
-    def compute(self, built, wanted, name, own, progress):
-        results.check_wavelength(own.wavelength, built.laplacian.points, name)
-        found = core.clean.roughness(built.laplacian, own.wavelength or None, progress=progress)
-        return self.named(Told(found, [], f"{name}: {results.roughness_line(found, number_text)}"))
-
-
-class Segment(ResultVerb):
-    """The verb `segment`."""
-
-    name = operator = "segment"
-    help = "divide the points into parts, such as the limbs of a figure, or where a vibration mode has one sign"
-    settings = tuple(segmenting.SEGMENT.values())
-
-    def compute(self, built, wanted, name, own, progress):
-        found = segmenting.segmented(built.laplacian, own.method, own.parts, own.mode, uncached, progress)
-        return self.named(Told(found, [], segmenting.parts_line(found, name)))
-
-
-class Signature(ResultVerb):
-    """The verb `signature`."""
-
-    name = operator = "signature"
-    help = "compute heat or wave kernel signatures, which are unchanged by bending"
-    settings = tuple(segmenting.SIGNATURE.values())
-
-    def compute(self, built, wanted, name, own, progress):
-        found = segmenting.signatures(built.laplacian, own.kind, own.count, own.modes, uncached, progress)
-        values = dict(zip(segmenting.signature_names(own.kind, own.count), found.T, strict=True))
-        return Told(values, [], segmenting.signature_line(own.count, name))
-
-
-class HarmonicField(ResultVerb):
-    """The verb `harmonic-field`."""
-
-    name, operator = "harmonic-field", "harmonic_field"
-    help = "interpolate a harmonic field between given values, or solve Poisson's equation"
-    settings = tuple(fields.HARMONIC.values())
-
-    def wanted(self, cloud, own, arguments):
-        source = None
-        if own.source:
-            source = cloud.numbers(own.source, "--source").astype(np.float64)
-            fields.check_source(source, own.source, str(cloud.path))
-        weights = {}
-        for setting in fields.giving(own, cloud.has):
-            option = f"--{setting.replace('_', '-')}"
-            least = int(own.values == "GROUPS")
-            weights[setting] = read_weights(cloud, getattr(own, setting), option, least, outside=np.nan)
-        how = "Name columns of the file by --low-group and --high-group, or by --group."
-        count = len(cloud.points)
-        return fields.given_shares(own, weights, count, "column", str(cloud.path), how, cloud.has), source
-
-    def compute(self, built, wanted, name, own, progress):
-        found = fields.solved(built.laplacian, *wanted, own.low, own.high, uncached, progress)
-        return self.named(Told(found, [], fields.field_line(found, name)))
 
 
 class Orient(ResultVerb):
@@ -184,5 +95,5 @@ class Orient(ResultVerb):
             lambda method, viewpoint, compute: compute(),
         )
         turned = analysis.oriented(built, sides)
-        values = {**turned.measures, ORIENTATION: turned.measures[NORMAL]}
+        values = {**turned.measures, quantities.ORIENTATION: turned.measures[quantities.NORMAL]}
         return Told(values, notices, orienting.reversed_line(None, sides, name))

@@ -5,8 +5,7 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from . import core
-from .quantities import quantity
+from . import core, quantities
 from .ticks import round_ticks, tick_texts
 from .units import attribute_power, unit
 
@@ -47,7 +46,7 @@ def profile_picture(table: str, settings) -> str:
         ) from error
     name = names[-2]
     power = 1 if name == "height" else attribute_power(name)
-    label = "Height" if name == "height" else quantity(name).label or name
+    label = "Height" if name == "height" else quantities.quantity(name).label or name
     titles = []
     for text, column, of_length in (("Distance", across, 1), (label, values, power)):
         raised, factor = unit(of_length, float(np.nanmax(np.abs(column))), settings)

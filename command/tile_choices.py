@@ -2,9 +2,8 @@
 
 from pathlib import Path
 
-from . import core
+from . import core, tools
 from .orienting import add_viewpoint
-from .results import ROUGHNESS
 from .settings import Setting, add_setting
 
 _FORMATS = (".ply", ".laz", ".las", ".csv", ".xyz", ".npy")
@@ -15,7 +14,7 @@ _ORIENT = Setting(
     "OUTSIDE",
     choices=("OUTSIDE", "UP", "VIEWPOINT"),  # as in core
 )
-_WAVELENGTH = ROUGHNESS["wavelength"]
+_WAVELENGTH = tools.roughness.WAVELENGTH
 
 
 def add_measures(parser):

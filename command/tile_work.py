@@ -9,8 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from . import clouds, core
-from .quantities import eigenvector_name, rows_of, written_by
+from . import clouds, core, quantities
 
 STORE = "store"  # the folder within that of a run
 _TILE = re.compile(r"tile_\d{6,}(_smoothed)?\.\w+")
@@ -189,12 +188,12 @@ def _table(store, number, smoothed):
     if len(channels) >= 3:
         alpha = channels[3] if len(channels) > 3 else None
         colors = core.files.unit_colors(np.stack(channels[:3], axis=1), alpha, store.manifest["full color"])
-    measures = {row.attribute: row.of(results) for row in rows_of("analyze")}
+    measures = {row.attribute: row.of(results) for row in quantities.rows_of("analyze")}
     if core.tiles.ROUGHNESS in found:
-        measures |= dict.fromkeys(written_by("roughness"), found[core.tiles.ROUGHNESS])
+        measures |= dict.fromkeys(quantities.written_by("roughness"), found[core.tiles.ROUGHNESS])
     if store.done("modes", number):
         vectors = store.read("modes", number, "modes").T
-        measures |= {eigenvector_name(place): vector for place, vector in enumerate(vectors, 1)}
+        measures |= {quantities.eigenvector_name(place): vector for place, vector in enumerate(vectors, 1)}
     points = found["surface_points"] if smoothed else store.own(number)
     stated = store.manifest.get("las")
     las = None if stated is None else core.files.LasForm(**stated)

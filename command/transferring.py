@@ -6,11 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import core
-from .quantities import PREFIX, TRANSFER, quantity
-from .settings import Setting, radians
+from . import core, quantities
+from .settings import Setting
 
-FILLED, TAKEN, FAR = range(len(quantity(TRANSFER).names))
+FILLED, TAKEN, FAR = range(len(quantities.quantity(quantities.TRANSFER).names))
 _NAMED = 5  # attributes that a notice names
 
 MATCH = {
@@ -30,7 +29,6 @@ MATCH = {
             math.radians(30.0),
             math.radians(1.0),
             math.radians(90.0),
-            convert=radians,
             form="DEGREES",
         ),
     )
@@ -58,7 +56,7 @@ class Match(NamedTuple):
         Of the points.
     places : SurfaceMatch
     state : ndarray, (n,) int
-        The number of a name of the result `TRANSFER`.
+        The number of a name of the result `quantities.TRANSFER`.
     notices : list of str
         About surfaces whose sheets are hardly told apart.
     """
@@ -147,10 +145,10 @@ def is_wanted(name, own, color) -> bool:
     """Whether an attribute is transferred by settings, which may ask for the colors alone."""
     if own.attributes == "COLOR":
         return name == color
-    ours = name.startswith(PREFIX)
+    ours = name.startswith(quantities.PREFIX)
     if own.attributes == "ALL":
         return not ours
-    return fnmatchcase(name, own.pattern) and (not ours or bool(quantity(name).attribute))
+    return fnmatchcase(name, own.pattern) and (not ours or bool(quantities.quantity(name).attribute))
 
 
 def check_found(found, own, where):

@@ -2,7 +2,7 @@
 
 from types import SimpleNamespace
 
-from .quantities import quantity
+from . import quantities
 
 EIGENVALUE_POWER = -2
 _METERS = {
@@ -28,7 +28,7 @@ _RAISED = {1: "", 2: "²", 3: "³"}
 
 def attribute_power(name: str) -> int:
     """Return the power of length in the unit of an attribute: 2 for areas, -1 for curvature, 0 for none."""
-    row = quantity(name)
+    row = quantities.quantity(name)
     return 0 if row.numbered else row.power
 
 

@@ -2,12 +2,10 @@
 
 from types import SimpleNamespace
 
-import numpy as np
-
-from . import analysis, clouds, core
+from . import analysis, clouds, core, quantities
 from .analysis import WRITE_LIMIT
 from .bending import Deform, SplatInfo
-from .cleaning import STRAYS, THIN_OUT, check_some_stay, stray_line, thin_line, thinner
+from .cleaning import STRAYS, check_some_stay, stray_line
 from .cloud_verb import CloudVerb, SurfaceVerb, floaters
 from .measures import (
     OVER,
@@ -21,33 +19,23 @@ from .measures import (
     volumes_over,
 )
 from .mesh_verb import Mesh
-from .moving_verbs import MinimalSurface, ModeShape, Smooth
-from .quantities import EIGENVALUES, SEGMENT, STRAY, eigenvector_name, written_by
+from .moving_verbs import MinimalSurface
 from .reference_verbs import Align, Compare, ReferenceVerb, TransferAttributes
-from .result_verbs import (
-    HarmonicField,
-    Orient,
-    PrincipalCurvatures,
-    Roughness,
-    Segment,
-    Signature,
-    SurfaceVariation,
-)
+from .result_verbs import Orient
 from .results import number_text
 from .rows import TABLES, write_rows
 from .settings import LAPLACIAN, Setting, chosen
-from .source_verbs import ExtendDirection, GeodesicDistance, NearestSource, SignedDistance, Simulate, Unwrap
+from .source_verbs import Simulate
 from .summary import Report
 from .table_verbs import Profile, Section
 from .tile_verbs import TilesAgree, TilesCut, TilesMeasure, TilesModes, TilesReport, TilesRun, TilesSurvey
+from .tool_verb import declared_verbs
 
 
 def make_verbs() -> list:
     """Return new verbs of all kinds: those on surfaces, those on points, and those that need no object."""
-    on_surfaces = (Analyze, *_MEASURING, *_MOVING, Mesh, Segment, Signature, *_ALONG, HarmonicField)
-    return [
-        verb() for verb in (*on_surfaces, StrayPoints, ThinOut, Align, Compare, TransferAttributes)
-    ] + without_object()
+    others = Measure, Section, Profile, Orient, MinimalSurface, Mesh, Simulate, *_POINTS
+    return [Analyze(), *declared_verbs(), *(verb() for verb in others), *without_object()]
 
 
 def without_object() -> list:
@@ -150,10 +138,10 @@ class Analyze(Frames, SurfaceVerb):
             spectrum, overlaps, self._earlier = analysis.continued(spectrum, laplacian.areas, places, self._earlier)
             matched["overlaps"] = overlaps.tolist()
         measures, written = built.measures, []
-        numbers = {} if spectrum is None else {EIGENVALUES: spectrum.eigenvalues}
+        numbers = {} if spectrum is None else {quantities.EIGENVALUES: spectrum.eigenvalues}
         if output is not None:
             vectors = () if spectrum is None else spectrum.eigenvectors[:, : own["write_limit"]].T
-            modes = {eigenvector_name(number): vector for number, vector in enumerate(vectors, 1)}
+            modes = {quantities.eigenvector_name(number): vector for number, vector in enumerate(vectors, 1)}
             everything = analysis.arrays(cloud.place, built, spectrum) if output.suffix.lower() == ".npz" else None
             written = clouds.write(output, given, {**measures, **modes}, everything, numbers)
         return {**analysis.figures(measures, spectrum), **matched}, [*built.notices, *notices, *written]
@@ -182,9 +170,9 @@ class Measure(ReferenceVerb):
 
     def work(self, path, given, arguments, output, progress):
         cloud, own = clouds.Cloud(path, given, floaters(arguments)), SimpleNamespace(**chosen(self.settings, arguments))
-        labels, [roughness] = cloud.columns.get(SEGMENT), written_by("roughness")
+        labels, [roughness] = cloud.columns.get(quantities.SEGMENT), quantities.written_by("roughness")
         if labels is not None:
-            check_labels(labels, SEGMENT, str(path))
+            check_labels(labels, quantities.SEGMENT, str(path))
         name = own.source or (roughness if roughness in cloud.columns else "")
         values = cloud.numbers(name, "--source") if name else None
         if values is not None:
@@ -230,28 +218,11 @@ class StrayPoints(CloudVerb):
         check_some_stay(found)
         written = []
         if output is not None and action == "DELETE":
-            written = clouds.write(output, cloud.taken(~found), {STRAY: found[~found]})
+            written = clouds.write(output, cloud.taken(~found), {quantities.STRAY: found[~found]})
         elif output is not None:
-            written = clouds.write(output, given, {STRAY: found})
+            written = clouds.write(output, given, {quantities.STRAY: found})
         line = f"{path.stem}: {stray_line(found)}{', deleted' if action == 'DELETE' and found.any() else ''}"
         return {"points": len(found) - (action == "DELETE") * int(found.sum()), "done": line}, written
 
 
-class ThinOut(CloudVerb):
-    """The verb `thin-out`."""
-
-    name = "thin-out"
-    help = "leave evenly spread points, to a spacing or a number; edges first"
-    settings = tuple(THIN_OUT.values())
-
-    def work(self, path, given, arguments, output, progress):
-        cloud = clouds.Cloud(path, given, floaters=False)
-        kept, spacing = thinner(cloud.points, **chosen(self.settings, arguments))(progress)
-        written = [] if output is None else clouds.write(output, cloud.taken(kept), {})
-        apart = "" if spacing is None else f", at least {spacing:.4g} from each other"
-        return {"points": int(np.count_nonzero(kept)), "done": f"{path.stem}: {thin_line(kept)}{apart}"}, written
-
-
-_MEASURING = PrincipalCurvatures, Roughness, SurfaceVariation, Orient, Measure, Section, Profile
-_MOVING = Smooth, ModeShape, MinimalSurface
-_ALONG = GeodesicDistance, NearestSource, SignedDistance, Unwrap, ExtendDirection, Simulate
+_POINTS = StrayPoints, Align, Compare, TransferAttributes

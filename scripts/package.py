@@ -11,7 +11,17 @@ import manual_pages
 import pythons
 from environments import ROOT, newest_blender, run
 
-PACKAGE = ("blender_manifest.toml", "__init__.py", "core", "command", "operators", "ui", "LICENSE", "README.md")
+PACKAGE = (
+    "blender_manifest.toml",
+    "__init__.py",
+    "core",
+    "tools",
+    "command",
+    "operators",
+    "ui",
+    "LICENSE",
+    "README.md",
+)
 WHEELS = ROOT / "build" / "wheels"
 STAGE = ROOT / "build" / "package"
 OUTPUT = ROOT / "dist"

@@ -2,8 +2,8 @@
 
 import bpy
 
-from ..command.quantities import STRAY
 from ..operators.objects import motion_files
+from ..tools.quantities import STRAY
 from .measures import draw_measures
 from .panel import ReadyPanel, draw_tools
 from .wrapping import draw_text

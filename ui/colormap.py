@@ -3,12 +3,12 @@
 import bpy
 from bpy.props import BoolProperty, FloatProperty, StringProperty
 
-from ..command.quantities import quantity
 from ..operators.objects.all_or_nothing import all_or_nothing
 from ..operators.objects.color_choices import COLOR_CHOICES, color_choice
 from ..operators.objects.colors import own_material
 from ..operators.registration import Registration, Row
 from ..operators.running.ready import ReadyOperator, reporting
+from ..tools.quantities import quantity
 from .display import find_display, is_colored
 from .show import look_at, show_attribute, show_in_solid, show_own_material, use_material_preview
 

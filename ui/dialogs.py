@@ -2,7 +2,6 @@
 
 import bpy
 
-from ..command.groups import FIXED, HIGH, LOW, ROLES, SOURCE, VALUE
 from ..operators.deform.bake import MESHFREE_OT_deform_bake
 from ..operators.deform.tools import MESHFREE_OT_deform_apply, keyed_empties
 from ..operators.files.exporting import MESHFREE_OT_export_points, MESHFREE_OT_export_splats
@@ -13,6 +12,7 @@ from ..operators.running.application import ApplicationOperator
 from ..operators.tools.profile import MESHFREE_OT_profile
 from ..operators.tools.select import MESHFREE_OT_select_grow, selection
 from ..operators.tools.sequence import MESHFREE_OT_analyze_sequence
+from ..tools.groups import FIXED, HIGH, LOW, ROLES, SOURCE, VALUE
 from .wrapping import draw_text
 
 _OPTIONAL = LOW, HIGH, VALUE  # not all of them are needed

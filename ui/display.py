@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from ..command.quantities import quantity
 from ..operators.objects.attributes import point_count, read_attribute
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, is_display
+from ..tools.quantities import quantity
 from .materials import ATTRIBUTE, COLORS, RANGE, shows_own
 from .nodes import DISC_COST, DISCS, MOST, SOLID_NAME
 from .value_range import CLASSES

@@ -4,12 +4,12 @@ from math import ceil, floor, isfinite, log10
 
 import bpy
 
-from ..command.quantities import quantity
 from ..command.units import attribute_power, unit
 from ..operators.objects.parts import are_outdated, kept_rows
 from ..operators.registration import Registration, Row
 from ..operators.running.ready import ReadyOperator
 from ..operators.tools.measure_live import followed
+from ..tools.quantities import quantity
 from .wrapping import beside_or_below, draw_text, split_properties
 
 _SHOWN = 8  # parts in the panel

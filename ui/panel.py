@@ -2,7 +2,6 @@
 
 import bpy
 
-from ..command.quantities import APPLICATIONS, DEVIATION, RESULTS, eigenvector_name, quantity
 from ..operators import registration
 from ..operators.deform.handles import handled_object
 from ..operators.objects.attributes import DISC, mode_number, point_count
@@ -13,6 +12,7 @@ from ..operators.objects.result import area_text, is_analyzed, is_stale, is_trus
 from ..operators.objects.splats import LEFT_BEHIND, are_left_behind, has_splats
 from ..operators.running.application import ApplicationOperator
 from ..operators.running.job import running
+from ..tools.quantities import APPLICATIONS, DEVIATION, RESULTS, eigenvector_name, quantity
 from .dialogs import draw_setting
 from .display import (
     draws_discs,

@@ -2,11 +2,11 @@
 
 import bpy.utils.previews
 
-from ..command.groups import ANCHOR, BOUNDARY_GROUP, FIXED, HANDLE, HIGH, LOW, ROLES, SOURCE, VALUE
 from ..operators.objects.counting import members
 from ..operators.objects.groups import has_group
 from ..operators.objects.reading import TYPES
 from ..operators.tools.convert import MESHFREE_OT_convert
+from ..tools.groups import ANCHOR, BOUNDARY_GROUP, FIXED, HANDLE, HIGH, LOW, ROLES, SOURCE, VALUE
 from . import colormaps
 from .measures import draw_selection
 from .panel import SidebarPanel, draw_tools

@@ -8,8 +8,6 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from .. import core
-from ..command.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, HIGH, LOW, ROLES
-from ..command.quantities import MEAN_CURVATURE, quantity
 from ..operators.deform.nodes import find_deform, is_baked, show_live, turns_discs
 from ..operators.objects.attributes import DISC, in_edit_mesh, point_count, positions_now, read_attribute
 from ..operators.objects.colors import is_color, own_colors, own_material
@@ -18,6 +16,8 @@ from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set_input
 from ..operators.objects.reading import TYPES, fingerprint, sharing_objects, spacing
 from ..operators.objects.splats import has_splats
+from ..tools.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, HIGH, LOW, ROLES
+from ..tools.quantities import MEAN_CURVATURE, quantity
 from . import colormaps, legend, smooth, solid
 from .display import (
     NAME,

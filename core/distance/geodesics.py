@@ -1,6 +1,7 @@
 """Distances along the surface."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 
@@ -28,7 +29,9 @@ _FILLED = 1.05  # radii of its cell that a place of the surface is off the neare
 
 
 @ends_at_one
-def geodesic_distance(laplacian: LaplaceBeltrami, sources: ArrayLike, *, progress: Progress | None = None) -> Floats:
+def geodesic_distance(
+    laplacian: LaplaceBeltrami, sources: ArrayLike, *, limit: float = np.inf, progress: Progress | None = None
+) -> Floats:
     """Measure the distance along the surface from the nearest of some points.
 
     Parameters
@@ -37,6 +40,8 @@ def geodesic_distance(laplacian: LaplaceBeltrami, sources: ArrayLike, *, progres
         Of n points.
     sources : array_like, (k,) int or (n,) bool
         Points to measure from, at least one.
+    limit : float
+        Points that are farther away [L] get infinity, and nothing is computed there.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
@@ -57,6 +62,8 @@ def geodesic_distance(laplacian: LaplaceBeltrami, sources: ArrayLike, *, progres
 
     Notes
     -----
+    Lengths of edges are computed once for all that is measured along the surface of an operator, and kept by it.
+
     The shortest path (Dijkstra, 1959) over all pairs of the operator, each as long as the circular arc through both
     points with their normals, tells in which order a front from the sources reaches the points, and nearly when. The
     front then passes the triangles of every point and two neighbours next to each other in direction, as in fast
@@ -85,65 +92,26 @@ def geodesic_distance(laplacian: LaplaceBeltrami, sources: ArrayLike, *, progres
     3.1 3.1
     """
     _known_sources(laplacian, sources)  # before the lengths, which take longer
-    return Geodesics(laplacian, progress=progress).distance(sources, progress=progress)
+    return geodesics_of(laplacian, progress).distance(sources, limit=limit, progress=progress)
+
+
+def geodesics_of(laplacian: LaplaceBeltrami, progress: Progress | None = None) -> "Geodesics":
+    """Return what finds distances along the surface of an operator, which keeps it."""
+    alone = replace(laplacian)  # keeps nothing, so that the two do not hold each other
+    return laplacian.kept.result("geodesics", lambda: Geodesics(alone, progress=progress))
 
 
 class Geodesics:
-    """Distances along a surface from several sets of points: lengths of edges are computed once.
+    """Distances along a surface from several sets of points: lengths of edges are computed once."""
 
-    Parameters
-    ----------
-    laplacian : LaplaceBeltrami
-        Of n points.
-    progress : callable, optional
-        Called as ``progress(stage, fraction)``; may raise `Cancelled`.
-
-    See Also
-    --------
-    geodesic_distance : Distances from one set of points.
-
-    Examples
-    --------
-    From both ends of the polar axis of the unit sphere to a point of the equator, a quarter of the way around:
-
-    >>> import numpy as np
-    >>> import meshfree_laplacian as mf
-    >>> points = mf.example_sphere()
-    >>> geodesics = mf.distance.Geodesics(mf.build_laplacian(points))
-    >>> print(*(geodesics.distance([pole])[400].round(1) for pole in (0, 799)))
-    1.6 1.6
-    """
-
-    @ends_at_one
     def __init__(self, laplacian: LaplaceBeltrami, *, progress: Progress | None = None) -> None:
         report = progress or (lambda stage, fraction: None)
         self._laplacian = laplacian
         self._graph = _lengths_of_pairs(laplacian, lambda: report("Lengths", 0.0))
         self._fans = Fans(laplacian, self._graph, lambda: report("Lengths", 0.4))
 
-    @ends_at_one
     def distance(self, sources: ArrayLike, *, limit: float = np.inf, progress: Progress | None = None) -> Floats:
-        """Measure the distance from the nearest of some points; see `geodesic_distance`.
-
-        Parameters
-        ----------
-        sources : array_like, (k,) int or (n,) bool
-            Points to measure from, at least one.
-        limit : float
-            Points that are farther away [L] get infinity, and nothing is computed there.
-        progress : callable, optional
-            Called as ``progress(stage, fraction)``; may raise `Cancelled`.
-
-        Returns
-        -------
-        ndarray, (n,)
-            Distances [L], zero at the sources; infinity on components without a source and at points left out.
-
-        Raises
-        ------
-        InvalidPointsError
-            No sources, all of them left out of the operator, or indices out of range.
-        """
+        """See `geodesic_distance`."""
         chosen, known = _known_sources(self._laplacian, sources)
         result = self._from(known, limit, progress)[0]
         result[chosen] = 0.0
@@ -160,41 +128,11 @@ class Geodesics:
         return distance, source
 
     def outward(self, distance: Floats) -> Array:
-        """Return the vector from the source to every point, as it arrives there; see `logarithmic_map`.
-
-        Parameters
-        ----------
-        distance : ndarray, (n,)
-            From one source [L], as of `distance`.
-
-        Returns
-        -------
-        ndarray, (n,) complex
-            In the tangent frames of the points [L].
-        """
+        """Return the vectors from a source to the points, by the distances from it, (n,) complex in their frames."""
         return self._fans.outward(distance)
 
-    @ends_at_one
     def nearest_source(self, sources: ArrayLike, *, progress: Progress | None = None) -> Ints:
-        """Find the nearest of some points; see `nearest_source`.
-
-        Parameters
-        ----------
-        sources : array_like, (k,) int or (n,) bool
-            Points to measure from, at least one.
-        progress : callable, optional
-            Called as ``progress(stage, fraction)``; may raise `Cancelled`.
-
-        Returns
-        -------
-        ndarray, (n,) int
-            Index of the nearest source among the sources; -1 on components without one and at points left out.
-
-        Raises
-        ------
-        InvalidPointsError
-            No sources, all of them left out of the operator, named twice, or indices out of range.
-        """
+        """See `nearest_source`."""
         known = _known_sources(self._laplacian, sources)[1]
         index = as_indices(sources, len(self._laplacian.points), "sources")
         label = np.full(len(self._laplacian.points) + 1, -1)  # one more for points without a path to a source
@@ -202,29 +140,8 @@ class Geodesics:
         nearest = self._from(known, progress=progress)[1]
         return label[np.where(nearest < 0, -1, nearest)]
 
-    @ends_at_one
     def signed_distance(self, curve: ArrayLike, closed: bool = False, *, progress: Progress | None = None) -> Floats:
-        """Measure the distance from a curve, with a sign; see `signed_distance`.
-
-        Parameters
-        ----------
-        curve : array_like, (k,) int
-            The points of the curve in their order, at least two.
-        closed : bool
-            Whether the last point is joined with the first.
-        progress : callable, optional
-            Called as ``progress(stage, fraction)``; may raise `Cancelled`.
-
-        Returns
-        -------
-        ndarray, (n,)
-            Distances [L], negative on the right; infinity on other components and at points left out.
-
-        Raises
-        ------
-        InvalidPointsError
-            Fewer than two points, points named twice, left out or out of range, or on several components.
-        """
+        """See `signed_distance`."""
         laplacian = self._laplacian
         count = len(laplacian.points)
         check_switches(closed=closed)
@@ -268,23 +185,7 @@ class Geodesics:
         return np.where(np.isfinite(distance), np.where(label % 2 == 1, 1.0, -1.0) * distance, np.inf)
 
     def corners(self, first: int, last: int) -> Ints:
-        """Find the shortest path over pairs of points; see `geodesic_path`.
-
-        Parameters
-        ----------
-        first, last : int
-            Two points of one component.
-
-        Returns
-        -------
-        ndarray, (m,) int
-            All points of the path in their order, its ends included.
-
-        Raises
-        ------
-        InvalidPointsError
-            No path along the surface connects them.
-        """
+        """Return the points of the shortest path over pairs of points, (m,) int; see `geodesic_path`."""
         row = self._graph.indices[self._graph.indptr[first] : self._graph.indptr[first + 1]]
         if last in row:
             return np.array([first, last])
@@ -393,7 +294,7 @@ def nearest_source(laplacian: LaplaceBeltrami, sources: ArrayLike, *, progress: 
     0 1
     """
     _known_sources(laplacian, sources)
-    return Geodesics(laplacian, progress=progress).nearest_source(sources, progress=progress)
+    return geodesics_of(laplacian, progress).nearest_source(sources, progress=progress)
 
 
 @ends_at_one
@@ -446,7 +347,7 @@ def signed_distance(
     -1.0
     """
     _check_curve(laplacian, as_indices(curve, len(laplacian.points), "points of the curve"))
-    return Geodesics(laplacian, progress=progress).signed_distance(curve, closed, progress=progress)
+    return geodesics_of(laplacian, progress).signed_distance(curve, closed, progress=progress)
 
 
 def _check_curve(laplacian: LaplaceBeltrami, curve: Ints) -> None:

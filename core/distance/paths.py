@@ -13,7 +13,7 @@ from ..errors import ComponentError, InvalidPointsError
 from ..operator import ImplicitSurface, LaplaceBeltrami
 from ..progress import ends_at_one
 from ..types import Bools, Floats, Ints, Progress
-from .geodesics import Geodesics
+from .geodesics import geodesics_of
 
 _STEP = 0.5  # length of the sides of the polygon, in spacings
 _ROUNDS = 60  # of straightening, at most
@@ -29,7 +29,6 @@ def geodesic_path(
     start: int,
     end: int,
     *,
-    geodesics: Geodesics | None = None,
     progress: Progress | None = None,
 ) -> Floats:
     """Find the shortest path along the surface from a point to another.
@@ -40,8 +39,6 @@ def geodesic_path(
         Of n points.
     start, end : int
         Two of them.
-    geodesics : Geodesics, optional
-        Of the same operator, if there is one: most of the work for a single path.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
@@ -86,7 +83,7 @@ def geodesic_path(
     ends = laplacian.points[[first, last]]
     if first == last:
         return ends
-    corners = (geodesics or Geodesics(laplacian, progress=progress)).corners(first, last)
+    corners = geodesics_of(laplacian, progress).corners(first, last)
     report("Path", 0.5)
     path = _Path(laplacian, corners)
     path.straighten(lambda share: report("Path", 0.5 + 0.5 * share))

@@ -8,7 +8,7 @@ from ..errors import PointCloudError
 from ..geometry import as_mask
 from ..operator import LaplaceBeltrami
 from ..types import Bools, Floats, Ints
-from .geodesics import Geodesics
+from .geodesics import geodesics_of
 
 _OBLIQUE = 3.0  # slope to the ray of a surface whose points are distinguished from those behind it: 72 degrees
 
@@ -62,7 +62,7 @@ def grow(laplacian: LaplaceBeltrami, chosen: ArrayLike, distance: float) -> Bool
     sources = np.flatnonzero(mask & (laplacian.component >= 0))
     if not len(sources):
         return mask.copy()
-    return mask | np.isfinite(Geodesics(laplacian).distance(sources, limit=limit))
+    return mask | np.isfinite(geodesics_of(laplacian).distance(sources, limit=limit))
 
 
 def front_point(points: ArrayLike, eye: ArrayLike, direction: ArrayLike, reach: float) -> int:
@@ -170,7 +170,7 @@ def opposite_ends(laplacian: LaplaceBeltrami, share: float = 0.03) -> tuple[Ints
     component, areas = laplacian.component, laplacian.areas
     known = component >= 0
     largest = np.flatnonzero(component == np.bincount(component[known], weights=areas[known]).argmax())
-    geodesics = Geodesics(laplacian)
+    geodesics = geodesics_of(laplacian)
 
     def lengths(start: int) -> Floats:
         found = geodesics.distance([start])[largest]

@@ -1,5 +1,7 @@
 """Parallel transport of directions along the surface, and maps of it around a point."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -10,7 +12,7 @@ from ..geometry import as_indices
 from ..operator import LaplaceBeltrami, connection_laplacian, tangent_frames
 from ..progress import ends_at_one
 from ..types import Floats, Progress
-from .geodesics import Geodesics
+from .geodesics import Geodesics, geodesics_of
 
 _TIME = 3.0  # smoothing lengths that heat spreads over: fewer do not average out the randomness of points
 _FARTHEST = 200.0  # extent of the object in such lengths, at most, or the heat there underflows
@@ -48,7 +50,6 @@ def transport(
 
     See Also
     --------
-    Transport : Factors once, for several sets of directions.
     logarithmic_map : Directions and distances from one point.
 
     References
@@ -68,52 +69,22 @@ def transport(
     >>> print(np.abs(direction[ahead, 2]).round(1))
     1.0
     """
-    return Transport(laplacian, progress=progress).extend(sources, directions, progress=progress)
+    return transport_of(laplacian, progress).extend(sources, directions, progress=progress)
+
+
+def transport_of(laplacian: LaplaceBeltrami, progress: Progress | None = None) -> "Transport":
+    """Return the factors for an operator, which keeps them."""
+    alone = replace(laplacian)  # keeps nothing, so that the two do not hold each other
+    return laplacian.kept.result("transport", lambda: Transport(alone, progress=progress))
 
 
 class Transport:
-    """Parallel transport along a surface, prepared once for several sets of directions.
+    """Parallel transport along a surface, prepared once for several sets of directions."""
 
-    Parameters
-    ----------
-    laplacian : LaplaceBeltrami
-        Of n points.
-    progress : callable, optional
-        Called as ``progress(stage, fraction)``; may raise `Cancelled`.
-
-    Raises
-    ------
-    SolverError
-        The equations have no single solution.
-
-    See Also
-    --------
-    transport : For one set of directions.
-
-    Notes
-    -----
-    One step of heat flow by the connection Laplacian (Sharp, Soliman, Crane, 2019). The factors are those of a coarse
-    version of it; ten or so steps of refinement make the solution that of all points, accurate relative to its own
-    size also far from the sources, so that its directions are.
-
-    Examples
-    --------
-    Opposite directions stay opposite:
-
-    >>> import numpy as np
-    >>> import meshfree_laplacian as mf
-    >>> points = mf.example_sphere()
-    >>> field = mf.distance.Transport(mf.build_laplacian(points))
-    >>> print(np.abs(field.extend([0], [1, 0, 0]) + field.extend([0], [-1, 0, 0])).max().round(6))
-    0.0
-    """
-
-    @ends_at_one
     def __init__(self, laplacian: LaplaceBeltrami, *, progress: Progress | None = None) -> None:
         report = progress or _silent
         report("Equations", 0.0)
         self._laplacian = laplacian
-        self._geodesics: Geodesics | None = None
         self.frames = tangent_frames(laplacian.normals)
         areas = laplacian.areas
         length = max(
@@ -126,31 +97,8 @@ class Transport:
         )
         self._flow = TwoGrid(flow, mass, laplacian.points, report)
 
-    @ends_at_one
     def extend(self, sources: ArrayLike, directions: ArrayLike, *, progress: Progress | None = None) -> Floats:
-        """Extend directions to all points; see `transport`.
-
-        Parameters
-        ----------
-        sources : array_like, (k,) int or (n,) bool
-            Points with known directions, at least one.
-        directions : array_like, (k, 3) or (3,)
-            Their directions, of any length.
-        progress : callable, optional
-            Called as ``progress(stage, fraction)``; may raise `Cancelled`.
-
-        Returns
-        -------
-        ndarray, (n, 3)
-            Unit tangent vectors, zero on components without a source.
-
-        Raises
-        ------
-        InvalidPointsError
-            No sources, points or directions of another shape, not finite, or a direction along the normal.
-        SolverError
-            The solver did not converge.
-        """
+        """See `transport`."""
         index = as_indices(sources, len(self.frames), "sources")
         if not len(index):
             raise InvalidPointsError("There are no points with directions. Choose at least one point.")
@@ -170,48 +118,21 @@ class Transport:
         size = np.abs(found)
         return np.einsum("i,ij->ij", found.conj() / np.where(size > 0.0, size, 1.0), self.frames).real
 
-    @ends_at_one
     def logarithmic_map(
         self,
         source: int,
+        geodesics: Geodesics,
         direction: ArrayLike | None = None,
         *,
-        geodesics: Geodesics | None = None,
         progress: Progress | None = None,
     ) -> Floats:
-        """Map the surface around a point to the plane; see `logarithmic_map`.
-
-        Parameters
-        ----------
-        source : int
-            The point at the center.
-        direction : array_like, (3,), optional
-            Direction of the first coordinate.
-        geodesics : Geodesics, optional
-            Of the same operator, if there is one; otherwise computed once for all maps.
-        progress : callable, optional
-            Called as ``progress(stage, fraction)``; may raise `Cancelled`.
-
-        Returns
-        -------
-        ndarray, (n, 2)
-            Coordinates [L]; NaN on other components and at points left out.
-
-        Raises
-        ------
-        InvalidPointsError
-            A source that is not on the surface, or a direction along the normal.
-        SolverError
-            The solver did not converge.
-        """
-        laplacian, frames = self._laplacian, self.frames
+        """See `logarithmic_map`."""
+        frames = self.frames
         chosen = as_indices(source, len(frames), "sources")
         if len(chosen) != 1:
             raise InvalidPointsError(f"There are {len(chosen)} sources. Give the one point at the center of the map.")
         source = int(chosen[0])
         axis = self.extend([source], frames[source].real if direction is None else direction, progress=progress)
-        if geodesics is None:
-            geodesics = self._geodesics = self._geodesics or Geodesics(laplacian, progress=progress)
         distance = geodesics.distance([source], progress=progress)
         outward = geodesics.outward(distance) * np.einsum("ij,ij->i", axis, frames).conj()
         position = np.where(np.isfinite(distance), distance, np.nan) * np.exp(1j * np.angle(outward))
@@ -270,7 +191,8 @@ def logarithmic_map(
     >>> print(place[0], np.hypot(*place.T).max().round(1))
     [0. 0.] 3.1
     """
-    return Transport(laplacian, progress=progress).logarithmic_map(source, direction, progress=progress)
+    carried, geodesics = transport_of(laplacian, progress), geodesics_of(laplacian, progress)
+    return carried.logarithmic_map(source, geodesics, direction, progress=progress)
 
 
 def _silent(stage: str, fraction: float) -> None:

@@ -1,12 +1,11 @@
 """What was computed of an operator, kept for whoever needs it next."""
 
+import hashlib
 from collections.abc import Callable, Hashable
 from threading import Lock, RLock
 from typing import Any, TypeVar
 
 import numpy as np
-
-from ..types import Array
 
 _Value = TypeVar("_Value")
 
@@ -23,8 +22,8 @@ class Kept:
         self._found: dict[str, tuple[tuple[Hashable, ...], Any]] = {}
         self._locks: dict[str, Any] = {}  # those of `RLock`
 
-    def result(self, name: str, compute: Callable[[], _Value], *settings: Hashable | Array) -> _Value:
-        """Return the result of a name for settings, which arrays count among by their content."""
+    def result(self, name: str, compute: Callable[[], _Value], *settings: Any) -> _Value:
+        """Return the result of a name for settings: hashable ones, arrays, which count by their content, and tuples."""
         key = tuple(map(_content, settings))
         return self.serving(name, compute, lambda kept, _: kept == key, key)
 
@@ -47,13 +46,19 @@ class Kept:
             self._found[name] = key, value
             return value
 
+    def known(self, name: str) -> Any:
+        """Return the result of a name that is kept, whatever its settings; None if there is none."""
+        return self._found.get(name, ((), None))[1]
+
     def clear(self) -> None:
         """Drop all results."""
         self._found.clear()
 
 
-def _content(setting: Hashable | Array) -> Hashable:
-    """Return what stands for a setting: of an array its shape, type and bytes."""
+def _content(setting: Any) -> Hashable:
+    """Return what stands for a setting: of an array its shape, type, and a digest of its bytes."""
+    if isinstance(setting, tuple):
+        return tuple(map(_content, setting))
     if not isinstance(setting, np.ndarray):
         return setting
-    return setting.shape, setting.dtype.str, np.ascontiguousarray(setting).tobytes()
+    return setting.shape, setting.dtype.str, hashlib.blake2b(np.ascontiguousarray(setting)).digest()

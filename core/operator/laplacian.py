@@ -122,6 +122,12 @@ class LaplaceBeltrami(Frozen):
         """What was computed of it and may be needed again: modes, factors, distances, a mesh."""
         return Kept()
 
+    @property
+    def known_modes(self) -> int:
+        """How many modes `eigenpairs` has at once."""
+        found = self.kept.known("modes")
+        return 0 if found is None else len(found.eigenvalues)
+
     def release(self) -> None:
         """Drop what was computed of the operator and is kept: its modes, factors, distances and mesh.
 

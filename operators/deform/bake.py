@@ -4,9 +4,9 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, IntProperty
 
-from ...command.quantities import DISPLACEMENT
 from ...core import NotEnoughMemoryError, PointCloudError
 from ...core.memory import available_memory
+from ...tools.quantities import DISPLACEMENT
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.animation import TRANSFORM
 from ..objects.attributes import point_count, read_attribute, write_attribute

@@ -10,7 +10,7 @@ import bmesh
 import bpy
 import numpy as np
 
-from ...command.quantities import DISPLACEMENT
+from ...tools.quantities import DISPLACEMENT
 from ..objects.attributes import (
     REST,
     in_edit_mesh,

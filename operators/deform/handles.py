@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ... import core
-from ...command.groups import ANCHOR
 from ...core import LaplacianOptions, PointCloudError
+from ...tools.groups import ANCHOR
 from ..objects.counting import weighted_checksum
 from ..objects.groups import chosen_weights, handle_names, is_chosen
 from ..objects.options import laplacian_options, settings_values

@@ -2,7 +2,7 @@
 
 import bpy
 
-from ...command.quantities import DISPLACEMENT
+from ...tools.quantities import DISPLACEMENT
 from ..objects.attributes import DISC, REST
 from ..objects.carried import carried
 from ..objects.modifiers import DEFORM_TAG, SHAPE_TAG, is_deform, is_display, is_intact, new_group, set_input

@@ -10,8 +10,8 @@ import bmesh
 import bpy
 import numpy as np
 
-from ...command.quantities import DISPLACEMENT
 from ...core import PointCloudError
+from ...tools.quantities import DISPLACEMENT
 from ..objects.attributes import in_edit_mesh, point_count, tag_changed, write_attribute
 from ..objects.carried import write_moved
 from .kinds import kind_of

@@ -8,8 +8,8 @@ from bpy.props import BoolProperty
 from mathutils import Vector
 
 from ... import core
-from ...command.groups import ANCHOR, HANDLE
 from ...core import PointCloudError
+from ...tools.groups import ANCHOR, HANDLE
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import (
     DISC,

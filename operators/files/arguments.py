@@ -1,6 +1,6 @@
 """Options of the command line for properties of Blender."""
 
-from ...command.settings import Setting, place, radians
+from ...command.settings import Setting
 
 _UNITS = ("LENGTH", "AREA")
 
@@ -13,8 +13,8 @@ def as_setting(item) -> Setting:
     if item.type in {"BOOLEAN", "STRING"}:
         return Setting(name, description, item.default)
     if item.is_array:
-        return Setting(name, description, tuple(item.default_array), convert=place, form="X,Y,Z")
+        return Setting(name, description, tuple(item.default_array), form="X,Y,Z")
     if item.unit == "ROTATION":
-        return Setting(name, description, item.default, item.hard_min, item.hard_max, convert=radians, form="DEGREES")
+        return Setting(name, description, item.default, item.hard_min, item.hard_max, form="DEGREES")
     form = item.unit if item.unit in _UNITS else ""
     return Setting(name, description, item.default, item.hard_min, item.hard_max, form=form)

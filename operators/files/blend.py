@@ -10,11 +10,11 @@ from mathutils import Matrix
 
 from ...command.clouds import Kind, positions
 from ...command.colors import COLOR
-from ...command.quantities import APPLICATIONS, MEAN_CURVATURE, NORMAL, ORIENTATION, RESULTS, quantity
 from ...command.settings import LAPLACIAN, add_setting
 from ...core import PointCloudError
 from ...core.files import SCANNER, PointTable
 from ...core.files.table import NORMAL as FILE_NORMAL
+from ...tools.quantities import APPLICATIONS, MEAN_CURVATURE, NORMAL, ORIENTATION, RESULTS, quantity
 from ..objects.attributes import (
     DISC,
     check_size,
@@ -26,7 +26,7 @@ from ..objects.attributes import (
     write_own_positions,
 )
 from ..objects.colors import own_colors
-from ..objects.curves import add_curves, plot
+from ..objects.curves import add_curves, plot, read_curve
 from ..objects.deleting import check_deletable, keep_points
 from ..objects.groups import add_group, group_weights
 from ..objects.handlers import notify
@@ -37,7 +37,6 @@ from ..objects.positions import check_movable as check_points_movable
 from ..objects.reading import TYPES, Reading, checked_matrix, obstacle, reading_notices, sharing_objects
 from ..objects.result import check_writable, note_stages, write_result
 from ..objects.splats import has_splats, write_splats
-from ..tools.along import read_curve
 from ..tools.analyze import Analysis
 from .arguments import as_setting
 from .columns import column_notices

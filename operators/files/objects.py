@@ -7,8 +7,6 @@ import numpy as np
 from bpy.props import StringProperty
 
 from ...command.colors import COLOR
-from ...command.groups import column_weights
-from ...command.quantities import NORMAL, PREFIX
 from ...core.files import (
     LasForm,
     PointTable,
@@ -18,6 +16,8 @@ from ...core.files import (
 )
 from ...core.files.table import NORMAL as FILE_NORMAL
 from ...core.files.table import SCANNER
+from ...tools.groups import column_weights
+from ...tools.quantities import NORMAL, PREFIX
 from ..objects.attributes import ONLY_DRAWN, STORABLE, read_attribute, type_of, write_attribute
 from ..objects.colors import own_colors
 from ..objects.groups import add_group, has_group

@@ -7,8 +7,8 @@ import numpy as np
 
 from ... import core
 from ...command.clouds import with_columns
-from ...command.quantities import PREFIX
 from ...core.files import choose_origin
+from ...tools.quantities import PREFIX
 from ..objects.attributes import ONLY_DRAWN, STORABLE, read_attribute, write_attribute
 from ..objects.place import OFFSET, place_of
 from ..objects.splat_file import (

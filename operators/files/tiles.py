@@ -9,11 +9,11 @@ import bpy
 from bpy.props import EnumProperty, IntProperty, StringProperty
 
 from ... import core
-from ...command.quantities import MEAN_CURVATURE, PREFIX
 from ...core import PointCloudError
 from ...core.errors import NotEnoughMemoryError
 from ...core.files import READABLE, SCANS, LasChoices, PointTable, chunks, extent, join_forms, join_notices, join_pieces
 from ...core.memory import available_memory
+from ...tools.quantities import MEAN_CURVATURE, PREFIX
 from ..objects.attributes import deselect
 from ..objects.box import Box, box_of
 from ..objects.colors import own_colors

@@ -6,8 +6,8 @@ import bmesh
 import bpy
 import numpy as np
 
-from ...command.quantities import AREA, COMPARED, EIGENVECTOR, ORIENTATION, quantity
 from ...core import PointCloudError
+from ...tools.quantities import AREA, COMPARED, EIGENVECTOR, ORIENTATION, quantity
 
 
 class _Storage(NamedTuple):

@@ -3,6 +3,7 @@
 import bpy
 import numpy as np
 
+from ...core import PointCloudError
 from .place import OFFSET
 
 
@@ -72,3 +73,27 @@ def _curve(name, lines, thickness):
         spline.points.foreach_set("co", places.astype(np.float32).reshape(-1))
         spline.use_cyclic_u = closed
     return curve
+
+
+def read_curve(context, name):
+    """Read the points of a curve object in the world, (k, 3), and whether its last one is joined with the first."""
+    curve = context.scene.objects.get(name)
+    if curve is None or curve.type != "CURVE":
+        raise PointCloudError(
+            f'There is no curve "{name}" in this scene. Choose a curve object that lies on the surface.'
+        )
+    evaluated = curve.evaluated_get(context.evaluated_depsgraph_get())
+    try:
+        mesh = evaluated.to_mesh()
+        places = np.empty((len(mesh.vertices), 3), np.float32)
+        mesh.vertices.foreach_get("co", places.reshape(-1))
+        thick = len(mesh.polygons) > 0
+    finally:
+        evaluated.to_mesh_clear()
+    if len(curve.data.splines) != 1 or len(places) < 2 or thick:
+        raise PointCloudError(
+            f'"{name}" is not one line: it has {len(curve.data.splines)} splines, or a bevel. Take a curve of one'
+            " spline, without a bevel or an extrusion."
+        )
+    matrix = np.array(curve.matrix_world)
+    return places @ matrix[:3, :3].T + matrix[:3, 3], curve.data.splines[0].use_cyclic_u

@@ -12,7 +12,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from ...command.groups import ANCHOR, HANDLE
+from ...tools.groups import ANCHOR, HANDLE
 from .handlers import notify
 
 

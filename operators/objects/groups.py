@@ -4,9 +4,9 @@ import re
 
 import numpy as np
 
-from ...command.groups import HIGH, LOW, VALUE, check_enough
-from ...command.groups import is_chosen as _is_chosen
 from ...core import PointCloudError
+from ...tools.groups import HIGH, LOW, VALUE, check_enough
+from ...tools.groups import is_chosen as _is_chosen
 from .attributes import point_count, read_attribute, tag_changed, write_attribute
 
 _GIVEN = LOW, HIGH, VALUE  # a point has one value

@@ -7,8 +7,8 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from ...command.quantities import MOTION
 from ...core import PointCloudError
+from ...tools.quantities import MOTION
 from .attributes import in_edit_mesh, point_count, tag_changed, write_attribute
 from .handlers import add_handlers, notify, remove_handlers
 from .notices import keep

@@ -3,7 +3,7 @@
 import bpy
 import numpy as np
 
-from ...command.quantities import MOTION, MOTION_MODE, NORMAL
+from ...tools.quantities import MOTION, MOTION_MODE, NORMAL
 from .animation import curves
 from .attributes import remove_numbered, write_attribute
 from .modifiers import MOTION_TAG, is_display, is_motion, new_group, set_input

@@ -7,8 +7,8 @@ import bpy
 import numpy as np
 
 from ... import core
-from ...command.quantities import ORIENTATION
 from ...core import PointCloudError
+from ...tools.quantities import ORIENTATION
 from .attributes import CORNER, has_vectors, own_positions, point_count, read_attribute
 from .counting import members
 from .evaluated import evaluated_positions
@@ -108,7 +108,7 @@ class Reading:
         return vectors @ self.matrix.T
 
     def local_directions(self, directions):
-        """Transform tangent directions, as read, to local unit vectors."""
+        """Transform tangent directions, as read, to local unit vectors; none to none."""
         return _units(self.local(directions))
 
     def local_normals(self, normals):
@@ -121,8 +121,8 @@ class Reading:
 
 
 def _units(vectors):
-    length = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None]
-    return vectors / np.where(length > 0.0, length, 1.0)
+    lengths = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None]
+    return vectors / np.where(lengths > 0.0, lengths, 1.0)
 
 
 def read_points(context, obj) -> Reading:

@@ -5,8 +5,8 @@ import zlib
 import bpy
 import numpy as np
 
-from ...command.quantities import AREA, EIGENVALUES, EIGENVECTOR, NORMAL, RESULTS, eigenvector_name
 from ...core import PointCloudError
+from ...tools.quantities import AREA, EIGENVALUES, EIGENVECTOR, NORMAL, RESULTS, eigenvector_name
 from .attributes import (
     ORIENTATION,
     check_names,

@@ -6,8 +6,8 @@ from itertools import count, takewhile
 import numpy as np
 
 from ... import core
-from ...command.quantities import DISPLACEMENT
 from ...core import PointCloudError
+from ...tools.quantities import DISPLACEMENT
 from .attributes import (
     REST,
     SPLAT_HARMONIC,

@@ -5,15 +5,13 @@ import numpy as np
 from bpy.props import EnumProperty, FloatProperty, StringProperty
 
 from ... import core
-from ...command import along, fields
-from ...command.groups import LOW, unreached
-from ...command.quantities import WEIGHT
 from ...core import PointCloudError
+from ...tools.groups import LOW, unreached
+from ...tools.quantities import WEIGHT
 from ..objects.attributes import tag_changed, write_attribute
 from ..objects.groups import check_assignable, chosen_members, group_weights, has_group, put_group
 from ..objects.result import length_text
 from ..registration import Registration, Row
-from ..running import cache
 from ..running.application import ShownOperator, Tool, operator_reader
 from ..tools.select import groups_changed, selected
 from .painting import WeightOperator
@@ -115,7 +113,8 @@ class WeightsFromSelection(Tool):
         shape = self.falloff.lower()
 
         def find(laplacian, progress):
-            distance = along.distance(laplacian, ones, cache, progress)
+            work = lambda: core.distance.geodesic_distance(laplacian, ones, progress=progress)  # noqa: E731
+            distance = laplacian.kept.result("weights by distance", work, ones)
             return (
                 core.distance.falloff(distance, radius, shape),
                 np.isfinite(distance),
@@ -136,7 +135,8 @@ class WeightsFromSelection(Tool):
         fixed, given = ones | zeros, ones[ones | zeros].astype(np.float64)
 
         def find(laplacian, progress):
-            field = fields.harmonic(laplacian, fixed, given, cache, progress)
+            work = lambda: core.distance.harmonic_field(laplacian, fixed, given, progress=progress)  # noqa: E731
+            field = laplacian.kept.result("weights between", work, fixed, given)
             known = np.unique(laplacian.component[fixed])
             reached = np.isin(laplacian.component, known) & ((laplacian.component >= 0) | fixed)
             return np.where(reached, np.clip(field, 0.0, 1.0), 0.0), reached, "between two ends"
@@ -155,7 +155,7 @@ class WeightsFromSelection(Tool):
         groups_changed(obj)
         some = np.count_nonzero(weights > 0.0)
         line = f'{obj.name}: {some:,} of {len(weights):,} points are in "{self.name}", {told}'
-        return [*unreached(reached, obj.name, "Their weight is 0."), line]
+        return [*unreached(reached, "Their weight is 0."), line]
 
 
 class MESHFREE_OT_weights_from_selection(WeightsFromSelection, WeightOperator, ShownOperator, bpy.types.Operator):

@@ -8,8 +8,8 @@ from bpy.props import BoolProperty, FloatProperty
 
 from ...command import transferring
 from ...command.naming import naming
-from ...command.quantities import TRANSFER
 from ...core import PointCloudError
+from ...tools.quantities import TRANSFER
 from ..objects.attributes import tag_changed, write_attribute
 from ..objects.handlers import notify
 from ..objects.reading import TYPES, obstacle

@@ -7,8 +7,8 @@ import numpy as np
 from bpy.props import EnumProperty, StringProperty
 
 from ...command import transferring
-from ...command.quantities import quantity
 from ...core import PointCloudError
+from ...tools.quantities import quantity
 from ..objects.attributes import STORABLE, check_names, point_count, read_attribute, write_attribute
 from ..objects.colors import COLORS, own_colors
 from ..registration import Registration, Row

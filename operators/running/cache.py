@@ -122,11 +122,6 @@ def result(laplacian, *settings, compute):
     return fetch(content(_sources[laplacian], *settings), compute, laplacian)
 
 
-def geodesics(laplacian, progress) -> "core.distance.Geodesics":
-    """Return the solver of geodesic distances of an operator from `build`, made only once."""
-    return result(laplacian, "geodesics", compute=lambda: core.distance.Geodesics(laplacian, progress=progress))
-
-
 def fetch(key, compute, laplacian=None):
     """Return the value of a key, computed by a function and kept if there is none.
 

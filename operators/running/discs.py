@@ -8,16 +8,16 @@ from ..objects.reading import discs
 from . import cache
 
 
-def disc_finder(obj, reading):
+def disc_finder(obj):
     """Read the discs of an object's display; return a function that computes those of moved points.
 
-    Its arguments are the points at full strength, in the space of `reading.points`, and the points; it returns normals
-    times radii, (n, 3), in local space, None without discs. Discs are computed for full strength, and kept;
+    Its arguments are how the points were read, the points at full strength in that space, and the points; it returns
+    normals times radii, (n, 3), in local space, None without discs. Discs are computed for full strength, and kept;
     interpolation gives those of lower strengths.
     """
     rest = discs_at_rest(obj)
 
-    def find(full, points):
+    def find(reading, full, points):
         if rest is None:
             return None
         local = reading.local(full)

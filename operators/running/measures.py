@@ -6,7 +6,7 @@ import numpy as np
 
 from ... import core
 from ...command.analysis import Built, floating_notices
-from ...command.quantities import rows_of
+from ...tools.quantities import rows_of
 from . import cache
 
 _ROWS = rows_of("analyze")

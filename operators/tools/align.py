@@ -8,8 +8,8 @@ from mathutils import Matrix
 from ... import core
 from ...command.alignment import ALIGN, check_found, doubts, middle
 from ...command.naming import naming
-from ...command.quantities import RESIDUAL
 from ...core import PointCloudError
+from ...tools.quantities import RESIDUAL
 from ..objects.attributes import tag_changed, write_attribute
 from ..objects.place import check_movable, move_object, moves_with
 from ..objects.reading import TYPES, find_object, obstacle, read_points

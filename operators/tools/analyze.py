@@ -9,8 +9,8 @@ from bpy.props import BoolProperty, IntProperty
 from ... import core
 from ...command import analysis
 from ...command.analysis import WRITE_LIMIT, Built
-from ...command.quantities import NORMAL
 from ...command.stages import StageTimes
+from ...tools.quantities import NORMAL
 from ..objects.attributes import point_count
 from ..objects.options import laplacian_options, point_budget
 from ..objects.reading import read_points

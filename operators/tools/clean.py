@@ -6,8 +6,8 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from ... import core
 from ...command.cleaning import STRAYS, check_some_stay, stray_line
-from ...command.quantities import COMPONENT, STRAY, quantity
 from ...core import PointCloudError
+from ...tools.quantities import COMPONENT, STRAY, quantity
 from ..objects.attributes import read_attribute, tag_changed, write_attribute
 from ..objects.deleting import check_deletable, keep_points
 from ..objects.reading import read_points

@@ -10,7 +10,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty
 from ...command.alignment import doubts
 from ...command.comparison import COMPARE, Compared, Sided, compared, line
 from ...command.naming import naming
-from ...command.quantities import COMPARED, DEVIATION
+from ...tools.quantities import COMPARED, DEVIATION
 from ..objects.attributes import tag_changed, write_attribute
 from ..objects.place import activate, hide
 from ..objects.reading import obstacle

@@ -6,8 +6,8 @@ from contextlib import contextmanager
 import bpy
 from bpy.props import EnumProperty
 
-from ...command.groups import ROLES
 from ...core import PointCloudError
+from ...tools.groups import ROLES
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import SELECTION, point_count, remove_attributes, write_attribute
 from ..objects.counting import renew_counts

@@ -6,7 +6,7 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from ...command.measures import check_labels, check_numbers, measured_line, part_table
-from ...command.quantities import SEGMENT, written_by
+from ...tools.quantities import SEGMENT, written_by
 from ..objects.attributes import read_attribute
 from ..objects.parts import keep_rows
 from ..objects.result import area_text

@@ -8,7 +8,7 @@ from bpy.props import BoolProperty, FloatProperty
 from ... import core
 from ...command.colors import COLOR, average
 from ...command.meshing import GAP, MESH
-from ...command.quantities import quantity
+from ...tools.quantities import quantity
 from ..objects.attributes import DISC, STORABLE, point_count, read_attribute, write_attribute
 from ..objects.color_choices import COLOR_CHOICES
 from ..objects.colors import COLORS, own_colors, splat_colors

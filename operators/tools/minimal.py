@@ -5,7 +5,7 @@ from bpy.props import FloatProperty, IntProperty, StringProperty
 
 from ... import core
 from ...command import minimal
-from ...command.groups import FIXED
+from ...tools.groups import FIXED
 from ..objects.groups import chosen_members, group_kind, is_chosen
 from ..objects.options import default_options, laplacian_options
 from ..objects.positions import check_movable, target_property, write_positions
@@ -37,7 +37,7 @@ class MinimalSurface(Tool):
         if is_chosen(obj, self.group, FIXED):
             fixed = chosen_members(obj, self.group, "Fixed")
         tolerance, steps, name = self.tolerance, self.steps, obj.name
-        kind, find_discs, carries = group_kind(obj), disc_finder(obj, reading), has_splats(obj.data)
+        kind, find_discs, carries = group_kind(obj), disc_finder(obj), has_splats(obj.data)
 
         def compute(progress):
             boundary = fixed
@@ -50,7 +50,7 @@ class MinimalSurface(Tool):
             if carries:
                 laplacian = build_operator(reading, options, progress).laplacian
                 gradients = core.deform.deformation_gradients(laplacian, film.points)
-            return reading, film, gradients, find_discs(film.points, film.points)
+            return reading, film, gradients, find_discs(reading, film.points, film.points)
 
         return compute
 

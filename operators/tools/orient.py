@@ -8,8 +8,8 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ...command import orienting
 from ...command.analysis import WRITE_LIMIT
-from ...command.quantities import AREA, NORMAL, ORIENTATION, RESULTS
 from ...core import PointCloudError
+from ...tools.quantities import AREA, NORMAL, ORIENTATION, RESULTS
 from ..objects.attributes import read_attribute
 from ..objects.reading import read_points
 from ..objects.result import write_result

@@ -1,38 +1,25 @@
-"""Segmentation into parts, objects of the parts, and heat and wave kernel signatures."""
+"""Vertex groups and objects of the parts of a segmentation."""
 
 import bpy
 import numpy as np
-from bpy.props import BoolProperty, EnumProperty, IntProperty
+from bpy.props import BoolProperty
 
-from ...command import segmenting
-from ...command.quantities import SEGMENT
 from ...core import PointCloudError
-from ..objects.attributes import read_attribute, remove_numbered, tag_changed, write_attribute
+from ...tools import segment
+from ...tools.quantities import SEGMENT
+from ..objects.attributes import read_attribute, write_attribute
 from ..objects.deleting import keep_points
 from ..objects.result import EIGENVALUES, check_writable
 from ..registration import Registration, Row
-from ..running import cache
-from ..running.application import ApplicationOperator, ShownOperator, Tool, operator_reader
+from ..running.application import ApplicationOperator
+from .declared import registration_of
 
 GROUP = "Segment {}"  # of vertex groups and objects
 
 
-class Segment(Tool):
-    """The settings and the work of `meshfree.segment`."""
+class SegmentGroups:
+    """What Blender adds to the tool: a vertex group of each part."""
 
-    writes = (SEGMENT,)
-    adjustable = ("vertex_groups", "show")
-
-    method: EnumProperty(
-        name="Method",
-        items=[
-            ("PARTS", "Parts", "As many connected parts as requested, divided where the shape is narrow"),
-            ("NODAL", "Signs of a Mode", "Connected regions in which a vibration mode keeps its sign"),
-        ],
-        **segmenting.SEGMENT["method"].keywords,
-    )
-    parts: IntProperty(name="Parts", soft_max=50, **segmenting.SEGMENT["parts"].keywords)
-    mode: IntProperty(name="Mode", soft_max=100, **segmenting.SEGMENT["mode"].keywords)
     vertex_groups: BoolProperty(
         name="Vertex Groups",
         description="Make a vertex group of each part; of point clouds an attribute",
@@ -41,29 +28,23 @@ class Segment(Tool):
 
     @property
     def asks(self):
-        """Names of the settings that the method takes."""
-        return "method", "mode" if self.method == "NODAL" else "parts", "vertex_groups", "show"
+        return *super().asks[:-1], "vertex_groups", "show"
+
+    @property
+    def adjustable(self):
+        return "vertex_groups", "show"
 
     def plan(self, context, obj):
         if self.vertex_groups and obj.type == "MESH":
             _check_groups(obj)
-        _, operator = operator_reader(context, obj)
-        given = self.method, self.parts, self.mode
-        return lambda progress: segmenting.segmented(operator(progress), *given, cache, progress)
+        return super().plan(context, obj)
 
     def write(self, context, obj, result):
-        write_attribute(obj.data, SEGMENT, result)
+        texts = super().write(context, obj, result)
         if self.vertex_groups:
-            _write_groups(obj, [result == label for label in range(int(result.max()) + 1)])
-        tag_changed(obj.data)
-        return [segmenting.parts_line(result, obj.name)]
-
-
-class MESHFREE_OT_segment(Segment, ShownOperator, bpy.types.Operator):
-    """Divide the points into parts, such as the limbs of a figure, or where a vibration mode has one sign"""
-
-    bl_idname = "meshfree.segment"
-    bl_label = "Segment"
+            parts = read_attribute(obj.data, SEGMENT)
+            _write_groups(obj, [parts == label for label in range(int(parts.max()) + 1)])
+        return texts
 
 
 def _is_numbered(name):
@@ -138,55 +119,7 @@ class MESHFREE_OT_separate_by_segment(ApplicationOperator, bpy.types.Operator):
         return [f"{obj.name}: {len(numbers) + 1} parts are objects of their own"]
 
 
-class Signature(Tool):
-    """The settings and the work of `meshfree.signature`."""
-
-    asks = ("kind", "count", "modes", "show")
-    adjustable = ("kind", "count", "show")
-
-    kind: EnumProperty(
-        name="Kind",
-        items=[
-            ("HEAT", "Heat", "Heat that is left after some time: high on tips and thin parts"),
-            ("WAVE", "Wave", "Waves of one energy: sharper, also for small features"),
-        ],
-        **segmenting.SIGNATURE["kind"].keywords,
-    )
-    count: IntProperty(name="Scales", soft_max=50, **segmenting.SIGNATURE["count"].keywords)
-    modes: IntProperty(name="Modes", soft_max=300, **segmenting.SIGNATURE["modes"].keywords)
-
-    @property
-    def writes(self):
-        """Names of the attributes."""
-        return segmenting.signature_names(self.kind, self.count)
-
-    def plan(self, context, obj):
-        _, operator = operator_reader(context, obj)
-        given = self.kind, self.count, self.modes
-        return lambda progress: segmenting.signatures(operator(progress), *given, cache, progress)
-
-    def write(self, context, obj, result):
-        remove_numbered(obj.data, segmenting.signature_prefix(self.kind), beyond=self.count)
-        for name, values in zip(self.writes, result.T, strict=True):
-            write_attribute(obj.data, name, values)
-        tag_changed(obj.data)
-        return [segmenting.signature_line(self.count, obj.name)]
-
-
-class MESHFREE_OT_signature(Signature, ShownOperator, bpy.types.Operator):
-    """Compute heat or wave kernel signatures, which are unchanged by bending"""
-
-    bl_idname = "meshfree.signature"
-    bl_label = "Signatures"
-
-
 TOOLS = (
-    Registration(
-        MESHFREE_OT_segment,
-        panel=Row("Segment", 1, 1),
-        menu=Row("Object", 5, 1),
-        quick=Row("Object", 1, 2, "Segment"),
-    ),
+    registration_of(segment.TOOL, SegmentGroups),
     Registration(MESHFREE_OT_separate_by_segment, panel=Row("Segment", 1, 2), menu=Row("Object", 5, 2)),
-    Registration(MESHFREE_OT_signature, panel=Row("Measure", 4, 1), menu=Row("Object", 5, 3)),
 )

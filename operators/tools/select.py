@@ -9,9 +9,9 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 from bpy_extras import view3d_utils
 
 from ... import core
-from ...command.groups import HANDLE, SOURCE
 from ...command.naming import naming
 from ...core import PointCloudError
+from ...tools.groups import HANDLE, SOURCE
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import (
     SELECTION,

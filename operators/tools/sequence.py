@@ -9,8 +9,8 @@ from bpy.props import BoolProperty, IntProperty
 
 from ...command.analysis import WRITE_LIMIT, continued
 from ...command.naming import naming
-from ...command.quantities import AREA, MEAN_CURVATURE, eigenvector_name
 from ...core import PointCloudError
+from ...tools.quantities import AREA, MEAN_CURVATURE, eigenvector_name
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.handlers import notify
 from ..objects.modifiers import COLLECTION, get_input, is_sequence

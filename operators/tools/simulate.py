@@ -9,10 +9,10 @@ import numpy as np
 from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ...command import simulation
-from ...command.groups import unreached
 from ...command.motions import Chosen, InModes, find_touched, in_modes
-from ...command.quantities import MOTION, NORMAL
 from ...core import PointCloudError
+from ...tools.groups import unreached
+from ...tools.quantities import MOTION, NORMAL
 from ..objects import motion_files
 from ..objects.motion import show_frame, show_values, write_frames
 from ..objects.motion_nodes import forget_groups, mode_name, show_motion
@@ -203,7 +203,7 @@ class Simulate(Tool):
 
     def about(self, obj, result) -> list:
         """Return notices about what was simulated."""
-        notices = unreached(result.reached, obj.name, "Nothing moves there.")
+        notices = unreached(result.reached, "Nothing moves there.")
         return [*notices, *simulation.dead(self.kind, result.motion.last)]
 
     def _about_kept(self, result):

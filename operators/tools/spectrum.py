@@ -3,7 +3,7 @@
 import bpy
 from bpy.props import IntProperty
 
-from ...command.quantities import eigenvector_name
+from ...tools.quantities import eigenvector_name
 from ..registration import Registration, Row
 from .analyze import AnalysisOperator
 

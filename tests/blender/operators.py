@@ -9,6 +9,7 @@ import pytest
 
 from tests.blender.clouds import everything
 from tests.blender.conftest import MODULE
+from tools.listed import listed_tools
 
 ROOT = Path(__file__).parents[2]
 NOT_TOOLS = {
@@ -22,6 +23,7 @@ def _names():
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.ClassDef) and node.name.startswith("MESHFREE_OT_"):
                 yield node.name.removeprefix("MESHFREE_OT_")
+    yield from (tool.name for tool in listed_tools())
 
 
 OPERATORS = sorted(_names())

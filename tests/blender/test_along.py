@@ -181,7 +181,7 @@ class TestSignedDistance:
         add_curve(np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=1), cyclic=True)
         assert run("signed_distance", curve="Line") == {"FINISHED"}
         assert (attribute(two, "lb_signed_distance")[900:] == 0.0).all()
-        assert "300 points of Cloud are reached by no source" in capfd.readouterr().out
+        assert "Cloud: 300 points are reached by no source" in capfd.readouterr().out
 
 
 def test_a_radius_that_is_no_number_is_refused():

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from command.quantities import rows_of
 from tests.blender.clouds import add_object, attribute, everything, local_points, result_names, sphere_points
 from tests.blender.conftest import part
 from tests.blender.operators import refused
 from tests.results import RESULTS
+from tools.quantities import rows_of
 
 
 @pytest.fixture

@@ -43,15 +43,10 @@ AGAIN = {
     "minimal_surface": ({"steps": 3}, {"steps": 3, "target": "IN_PLACE"}),
 }
 COSTLY = {  # where each is called from
-    "core": (
-        "build_laplacian",
-        "mean_curvature",
-        "mesh_surface",
-        "minimal_surface",
-        "orient_normals",
-        "surface_discs",
-        "values_on_mesh",
-    ),
+    "core": ("build_laplacian", "orient_normals"),
+    "core.deform": ("minimal_surface",),
+    "core.measure": ("mean_curvature",),
+    "core.surface": ("mesh_surface", "surface_discs", "values_on_mesh"),
     "core.operator.laplacian": ("build_laplacian",),
     "core.algebra.cholesky": ("dpotrf",),
     "core.algebra.solvers": ("conjugate_gradients",),

@@ -6,10 +6,10 @@ import bpy
 import numpy as np
 import pytest
 
-from command.quantities import quantity
 from tests.blender.clouds import add_group, add_object, attribute, sphere_points
 from tests.blender.test_panel import draw
 from tests.blender.test_seeing import add_camera
+from tools.quantities import quantity
 
 
 @pytest.fixture

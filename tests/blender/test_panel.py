@@ -83,6 +83,14 @@ class Settings(SimpleNamespace):
         return getattr(self, path)
 
 
+def settings_of(operator, repeated=False, **values):
+    """Return what stands in for an operator with these values of its properties, and is of its kind but for Blender."""
+    bases = [base for base in operator.__bases__ if not issubclass(base, bpy.types.bpy_struct)]
+    own = {name: value for name, value in vars(operator).items() if not name.startswith(("_", "bl_"))}
+    kind = type("StandsIn", (Settings, *bases), {**own, "is_repeated": lambda self, context: repeated})
+    return kind(**values)
+
+
 def draw():
     """Texts of all panels for the active object."""
     texts = []
@@ -161,10 +169,7 @@ def texts_of(name):
     texts, operator = [], getattr(bpy.types, f"MESHFREE_OT_{name}")
     properties = getattr(bpy.ops.meshfree, name).get_rna_type().properties
     values = {item.identifier: item.default for item in properties if hasattr(item, "default")}
-    settings = Settings(layout=Layout(texts), **values)
-    settings.asks = value_of(operator.asks, settings)
-    settings.is_repeated = lambda context: False
-    operator.draw(settings, bpy.context)
+    operator.draw(settings_of(operator, layout=Layout(texts), **values), bpy.context)
     return texts
 
 
@@ -355,11 +360,6 @@ def test_all_panels_are_known_to_these_tests():
     assert sorted(panels) == sorted(f"MESHFREE_PT_{name}" for name in (*PANELS, *TWINS))
 
 
-def value_of(attribute, settings):
-    """What an attribute of an operator is by its settings."""
-    return attribute.fget(settings) if isinstance(attribute, property) else attribute
-
-
 def test_dialogs_show_every_setting():
     add_object(sphere_points())
     dialogs = [name for name, tool in tools().items() if getattr(tool.operator, "asks", ())]
@@ -378,9 +378,7 @@ def check_dialog(name):
     variants = [{item.identifier: choice} for item in choices for choice in item.enum_items.keys()]
     texts = []
     for variant in [{}, *variants, *({item.identifier: True} for item in properties if item.type == "BOOLEAN")]:
-        settings = Settings(layout=Layout(texts), **values | variant | hidden)
-        settings.asks = value_of(operator.asks, settings)
-        settings.is_repeated = lambda context: False
+        settings = settings_of(operator, layout=Layout(texts), at_zero={}, **values | variant | hidden)
         operator.draw(settings, bpy.context)
     assert {text for text in texts if " " not in text} == set(values), name
 
@@ -393,11 +391,10 @@ def test_adjust_last_operation_offers_what_is_quick(name):
     properties = getattr(bpy.ops.meshfree, name).get_rna_type().properties
     values = {item.identifier: item.default for item in properties if item.type != "POINTER"}
     for variant in ({}, {"keep": "AREA"}, {"source": "x"}):
-        settings = Settings(**values | {key: value for key, value in variant.items() if key in values})
-        settings.wanted = 10  # modes of an analysis
-        quick = value_of(operator.adjustable, settings)
-        texts = []
-        settings.layout, settings.adjustable, settings.is_repeated = Layout(texts), quick, lambda context: True
+        given = {key: value for key, value in variant.items() if key in values}
+        given |= {"layout": Layout(), "at_zero": {}, "wanted": 10}  # modes of an analysis
+        settings = settings_of(operator, True, **values | given)
+        quick, texts = settings.adjustable, settings.layout.texts
         operator.draw(settings, bpy.context)
         assert texts == list(quick)
         assert not {"method", "modes", "parts", "wavelength", "handles", "tolerance"} & set(quick)
@@ -472,9 +469,7 @@ def test_zero_that_leaves_a_setting_open_is_put_into_words():
         properties = getattr(bpy.ops.meshfree, name).get_rna_type().properties
         values = {item.identifier: item.default for item in properties if item.type != "POINTER"}
         for value, said in ((0, True), (3, False)):
-            settings = Settings(**values | {setting: value}, at_zero=operator.at_zero)
-            settings.asks, settings.is_repeated = value_of(operator.asks, settings), lambda context: False
-            settings.layout = Layout([])
+            settings = settings_of(operator, layout=Layout(), **values | {setting: value})
             operator.draw(settings, bpy.context)
             assert (words in settings.layout.texts) == (said and setting in settings.asks), name
 

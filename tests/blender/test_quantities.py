@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from command.quantities import QUANTITIES, quantity, rows_of
 from tests.blender.clouds import add_group, add_object, attribute, sphere_points
 from tests.results import RESULTS
+from tools.quantities import QUANTITIES, quantity, rows_of
 
 CALLS = {  # of tools that need arguments, or write more in several calls
     "signed_distance": ({"curve": "Line"},),

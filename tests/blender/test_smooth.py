@@ -136,7 +136,7 @@ def test_an_error_in_one_object_leaves_all_others():
 
 def test_a_boundary_that_stays_fixes_the_size():
     obj = add_object(grid_points()[0])
-    with refused(obj, '"Cloud" has a boundary.*Set Keep to Nothing, or turn off Keep Boundary'):
+    with refused(obj, '"Cloud": There is a boundary.*Set Keep to Nothing, or turn off Keep Boundary'):
         bpy.ops.meshfree.smooth(keep="AREA")
     assert bpy.ops.meshfree.smooth(keep="AREA", keep_boundary=False) == {"FINISHED"}
 

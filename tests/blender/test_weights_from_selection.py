@@ -145,7 +145,7 @@ def test_what_no_selected_point_reaches_is_told():
     bpy.ops.meshfree.weights_from_selection(radius=50.0)
     assert_array_equal(group(obj)[900:], 0.0)
     assert [notice.text for notice in obj.meshfree.notices] == [
-        "300 points of Cloud are reached by no source. Their weight is 0."
+        "300 points are reached by no source. Their weight is 0."
     ]
 
 

@@ -5,8 +5,8 @@ import re
 import bpy
 import pytest
 
-from command.quantities import QUANTITIES
 from tests.blender.test_manual import operators
+from tools.quantities import QUANTITIES
 
 # Words that stay small within a label, and names that are not written as others are.
 SMALL = {"a", "and", "as", "at", "by", "for", "from", "in", "of", "on", "or", "the", "to", "with"}

@@ -472,7 +472,6 @@ def calls():
     yield core.distance.solve_poisson, on, {"source": points[:, 2], "fixed": [0], "fixed_values": [0.0]}
     yield core.distance.geodesic_distance, on, {"sources": [0]}
     yield core.distance.falloff, {}, {"distance": points[:, 0] ** 2, "radius": 1.0, "shape": "sharp"}
-    yield core.distance.Geodesics(laplacian).distance, {}, {"sources": [0]}
     yield core.distance.nearest_source, on, {"sources": [0, 150]}
     yield core.distance.signed_distance, on, {"curve": [100, 101, 102], "closed": True}
     yield core.distance.logarithmic_map, on, {"source": 0}

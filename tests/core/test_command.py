@@ -14,8 +14,8 @@ from command import verbs
 from command.colors import linear
 from command.main import run as run_command
 from command.meshing import close_gaps
-from command.quantities import rows_of
 from core.files import PointTable, read_points, write_points
+from tools.quantities import rows_of
 
 FAR = np.array([400_000.0, 5_000_000.0, 100.0])
 SPHERE = fibonacci_sphere(800)

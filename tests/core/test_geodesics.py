@@ -1,3 +1,5 @@
+import weakref
+
 import numpy as np
 import pytest
 
@@ -66,14 +68,13 @@ def test_scan_lines(across, jitter, noise):
     points[:, 2] = noise * np.random.default_rng(2).normal(size=len(points))
     points = points @ np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0] + [3e5, 5e6, 200.0]
     laplacian = core.build_laplacian(points)
-    geodesics, carried = core.distance.Geodesics(laplacian), core.distance.Transport(laplacian)
     for source in sources.values():
         exact = np.linalg.norm(points - points[source], axis=1)
         far = exact > 0.999 * across
-        found = geodesics.distance([source])
+        found = core.distance.geodesic_distance(laplacian, [source])
         assert np.mean(np.abs(found / np.maximum(exact, 1e-300) - 1.0)[far]) < 2e-3
         assert np.abs(found - exact)[far].max() < 0.15 * across
-        at = carried.logarithmic_map(source, geodesics=geodesics)
+        at = core.distance.logarithmic_map(laplacian, source)
         chords = np.linalg.norm(at - at[[sources["inside"]]], axis=1)  # a flat surface is mapped as it is
         away = np.linalg.norm(points - points[sources["inside"]], axis=1)
         assert np.mean(np.abs(chords - away)[far] / exact[far]) < 1e-2
@@ -84,15 +85,14 @@ def test_scan_lines(across, jitter, noise):
 def test_cells_and_sides_on_scan_lines(across):
     points, sources = scan_lines(across, 0.1)
     laplacian = core.build_laplacian(points)
-    geodesics = core.distance.Geodesics(laplacian)
     index = list(sources.values())
     apart = np.linalg.norm(points[:, None] - points[None, index], axis=2)
-    label = geodesics.nearest_source(index)
+    label = core.distance.nearest_source(laplacian, index)
     assert np.all(apart[np.arange(len(points)), label] < 1.01 * apart.min(axis=1) + 0.5)
     first, last = sources["side"], sources["side"] + 15
     way = (points[last] - points[first]) / np.linalg.norm(points[last] - points[first])
     exact = np.cross(way, points - points[first])[:, 2] * np.sign(laplacian.normals[0, 2])
-    found = geodesics.signed_distance([first, last])
+    found = core.distance.signed_distance(laplacian, [first, last])
     far = np.abs(exact) > across
     assert np.mean(np.abs(found - exact)[far] / np.abs(exact[far])) < 2e-2
     assert np.max(np.abs(found - exact)[far] / np.abs(exact[far])) < 0.15
@@ -176,13 +176,32 @@ def test_masks_are_sets_too(operators):
     assert np.all(found[~mask] > 0.0)
 
 
-def test_lengths_serve_many_sources(operators):
+def test_lengths_are_made_once_for_all_along_a_surface(operators, monkeypatch):
     laplacian = operators("even sphere")
-    geodesics = core.distance.Geodesics(laplacian)
-    for sources in ([0], [3, 1500], laplacian.points[:, 2] > 0.9):
-        np.testing.assert_array_equal(geodesics.distance(sources), core.distance.geodesic_distance(laplacian, sources))
-    with pytest.raises(core.InvalidPointsError, match="no sources"):
-        geodesics.distance([])
+    laplacian.release()
+    ways = [
+        lambda: core.distance.geodesic_distance(laplacian, [3, 1500]),
+        lambda: core.distance.nearest_source(laplacian, [3, 1500]),
+        lambda: core.distance.signed_distance(laplacian, [3, 1500]),
+        lambda: core.distance.geodesic_path(laplacian, 3, 1500),
+        lambda: core.distance.logarithmic_map(laplacian, 3),
+        lambda: core.distance.grow(laplacian, [3], 0.1),
+    ]
+    found = []
+    for way in ways:
+        laplacian.release()
+        found.append(way())
+    monkeypatch.setattr(core.distance.geodesics, "_lengths_of_pairs", lambda *_: pytest.fail("made again"))
+    for way, expected in zip(ways, found, strict=True):
+        np.testing.assert_array_equal(way(), expected)
+
+
+def test_an_operator_is_freed_with_what_it_keeps():
+    laplacian = core.build_laplacian(core.example_sphere())
+    core.distance.logarithmic_map(laplacian, 3)
+    alive = weakref.ref(laplacian)
+    del laplacian
+    assert alive() is None
 
 
 @pytest.mark.parametrize(("sources", "text"), [([], "no sources"), ([2500], "below 2500"), ([0.5], "whole numbers")])

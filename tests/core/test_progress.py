@@ -36,7 +36,6 @@ def test_all_calls_end_it():
 CALLS = {
     "spectrum": lambda laplacian, **given: laplacian.eigenpairs(4, **given),
     "distance": lambda laplacian, **given: core.distance.geodesic_distance(laplacian, 0, **given),
-    "class": lambda laplacian, **given: core.distance.Geodesics(laplacian, **given),
     "several inside": lambda laplacian, **given: core.distance.logarithmic_map(laplacian, 0, **given),
     "heat": lambda laplacian, **given: core.motion.Heat(laplacian, 0.1).advance(laplacian.points[:, 0], **given),
     "smooth": lambda laplacian, **given: core.clean.smooth_points(laplacian, 9, **given),

@@ -5,8 +5,8 @@ import re
 import pytest
 
 from command import quantities
-from command.quantities import QUANTITIES, quantity
 from tests.core.test_architecture import BLENDER_SIDE, ROOT, imported
+from tools.quantities import QUANTITIES, quantity
 
 PAGES = [path.read_text(encoding="utf-8") for path in sorted(ROOT.glob("docs/operators/*.md"))]
 CONSTANTS = {value: name for name, value in vars(quantities).items() if str(value).startswith("lb_")}

@@ -42,10 +42,10 @@ class TestNearestSource:
         assert_array_equal(core.distance.nearest_source(sphere, mask), core.distance.nearest_source(sphere, [300, 900]))
 
     def test_the_source_is_as_far_as_the_distance_says(self, sphere):
-        geodesics, sources = core.distance.Geodesics(sphere), [5, 900, 3000]
-        label, least = geodesics.nearest_source(sources), geodesics.distance(sources)
-        each = np.array([geodesics.distance([source]) for source in sources])
-        assert_allclose(each[label, np.arange(4160)], least, atol=1e-12)
+        sources = [5, 900, 3000]
+        label = core.distance.nearest_source(sphere, sources)
+        least, *each = (core.distance.geodesic_distance(sphere, rows) for rows in (sources, *sources))
+        assert_allclose(np.array(each)[label, np.arange(4160)], least, atol=1e-12)
 
     def test_wrong_arguments(self, square):
         with pytest.raises(core.InvalidPointsError, match="no sources"):
@@ -94,8 +94,9 @@ class TestSignedDistance:
 
     def test_it_reports_each_piece_of_the_curve(self, square):
         reports = []
-        geodesics = core.distance.Geodesics(square)
-        geodesics.signed_distance([0, 800, 1600], progress=lambda stage, fraction: reports.append((stage, fraction)))
+        curve, report = [0, 800, 1600], lambda stage, fraction: reports.append((stage, fraction))
+        core.distance.signed_distance(square, curve)  # which keeps lengths
+        core.distance.signed_distance(square, curve, progress=report)
         stages = [stage for stage, _ in reports]
         assert stages[:3] == ["Curve", "Curve", "Distance"]
         assert set(stages[3:]) <= {"Distance"}

@@ -42,7 +42,7 @@ class TestAlong:
         for verb, name in (("geodesic-distance", "distance"), ("nearest-source", "cell")):
             code, [line] = run(verb, source, "--group", "seed", "--out", tmp_path / "a.npz")
             assert code == 0, line
-            assert any(notice.startswith("400 points of a are reached by no source.") for notice in line["notices"])
+            assert any(notice.startswith("400 points are reached by no source.") for notice in line["notices"])
             found = np.load(tmp_path / "a.npz")[name]
             assert (found[400:] == -1).all()
             assert (found[:400] >= 0).all()
@@ -284,7 +284,7 @@ class TestMoving:
 
     def test_a_size_is_not_kept_beside_a_boundary(self, run, tmp_path):
         code, [line] = run("smooth", write(tmp_path / "a.ply", SQUARE), "--keep", "area")
-        assert (code, "has a boundary" in line["error"]) == (1, True)
+        assert (code, "There is a boundary" in line["error"]) == (1, True)
 
     def test_modes_move_along_normals_and_back(self, run, tmp_path):
         source, moved = write(tmp_path / "a.ply", SPHERE), []

@@ -4,7 +4,7 @@ To add a result, add a row. Nothing here needs Blender.
 """
 
 from operator import attrgetter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 PREFIX = "lb_"  # of the names of attributes of this extension
 COMPARED = "lb_compared"  # where there is a deviation from another cloud
@@ -75,20 +75,20 @@ class Quantity(NamedTuple):
     power: int = 0
     carried: str = "smooth"
     left_out: float | None = None
-    bounds: tuple | None = None
+    bounds: tuple[float, float] | None = None
     color_range: str = ""
     along_surface: bool = False
     numbered: bool = False
-    names: tuple = ()
+    names: tuple[str, ...] = ()
+
+    def of(self, found: Any) -> Any:
+        """Return its values from the result of the tool."""
+        return attrgetter(self.source)(found)
 
     @property
     def is_direction(self) -> bool:
         """Whether it is a unit vector in space, such as a normal."""
         return self.carried == "normal" or self.along_surface
-
-    def of(self, found):
-        """Return its values from the result of the tool."""
-        return attrgetter(self.source)(found)
 
 
 QUANTITIES = (  # in the order of the panel
@@ -315,12 +315,12 @@ def quantity(name: str) -> Quantity:
     return several if several.numbered else _NO_RESULT
 
 
-def rows_of(tool: str) -> tuple:
+def rows_of(tool: str) -> tuple[Quantity, ...]:
     """Return the rows of the results of a tool, by the name of its operator."""
     return tuple(row for row in QUANTITIES if row.tool == tool)
 
 
-def written_by(tool: str) -> tuple:
+def written_by(tool: str) -> tuple[str, ...]:
     """Return the names of the attributes that a tool writes."""
     return tuple(row.attribute for row in rows_of(tool))
 

@@ -1,0 +1,134 @@
+"""The subcommands of the tools that `tools/` declares."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+
+from . import clouds, core, tools
+from .cloud_verb import CloudVerb, SurfaceVerb, floaters
+from .groups import add_at, check_sources, read_sources, read_weights
+from .moving_verbs import write_moved
+from .results import number_text
+from .settings import LAPLACIAN, chosen
+
+
+class _Declared:
+    """A subcommand of a tool."""
+
+    def __init__(self, tool):
+        self.tool, self.settings = tool, tool.settings
+        self.name, self.operator = tool.name.replace("_", "-"), tool.name
+        self.help = tool.help[0].lower() + tool.help[1:]
+        self.reads = ("curve",) if "curve" in tool.reads else ()
+
+    def add_options(self, parser):
+        if "sources" in self.tool.reads:
+            add_at(parser)
+        if "curve" in self.tool.reads:
+            more = "; or the name of a curve object of the input" if clouds.kinds() else ""
+            parser.add_argument(
+                "--curve",
+                required=True,
+                metavar="FILE",
+                help=f"points of a curve on the surface in their order: {', '.join(core.files.READABLE)}{more}",
+            )
+            parser.add_argument("--closed", action="store_true", help="join the last point of the file with the first")
+        super().add_options(parser)
+
+    def check(self, parser, arguments):
+        if "sources" in self.tool.reads:
+            check_sources(parser, arguments)
+
+    def inputs(self, cloud, arguments):
+        """Return what the tool takes beside the points, and the values of its settings as attributes."""
+        own = SimpleNamespace(**chosen(self.settings, arguments))
+        return self.tool.inputs(FileCloud(cloud, arguments), own), own
+
+    def written(self, cloud, found, subject, own, output):
+        """Write what a tool found, and return what to print, and notices."""
+        outcome = self.tool.finish(found, subject, own, number_text)
+        notices, count = list(outcome.notices), len(cloud.points)
+        if outcome.kept is not None:
+            count = int(np.count_nonzero(outcome.kept))
+        if output is None:
+            pass
+        elif outcome.points is not None:
+            notices += write_moved(output, cloud, outcome.points, subject)
+        else:
+            given = cloud.given if outcome.kept is None else cloud.taken(outcome.kept)
+            notices += clouds.write(output, given, outcome.values)
+        return {"points": count, "done": f"{cloud.path.stem}: {outcome.line}"}, notices
+
+
+class ToolVerb(_Declared, SurfaceVerb):
+    """The subcommand of a tool that applies the operator."""
+
+    def work(self, path, given, arguments, output, progress):
+        cloud = clouds.Cloud(path, given, floaters(arguments))
+        inputs, own = self.inputs(cloud, arguments)
+        laplacian = self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress).laplacian
+        found = self.tool.compute(laplacian, inputs, own, progress)
+        figures, notices = self.written(cloud, found, laplacian, own, output)
+        return figures, [*laplacian.notices, *notices]
+
+
+class PointVerb(_Declared, CloudVerb):
+    """The subcommand of a tool that needs the points alone."""
+
+    @property
+    def bytes_a_point(self):
+        """Memory at the peak."""
+        return self.tool.bytes_a_point
+
+    def work(self, path, given, arguments, output, progress):
+        cloud = clouds.Cloud(path, given)
+        inputs, own = self.inputs(cloud, arguments)
+        found = self.tool.compute(cloud.points, inputs, own, progress)
+        return self.written(cloud, found, cloud.points, own, output)
+
+
+def declared_verbs() -> list:
+    """Return the subcommands of all declared tools."""
+    declared = tools.listed.listed_tools()
+    return [(PointVerb if isinstance(tool, tools.tool.PointTool) else ToolVerb)(tool) for tool in declared]
+
+
+class FileCloud:
+    """The points of a file as a tool reads them; see `tools.tool.Cloud`."""
+
+    kind, in_blender, repeats = "column", False, False
+
+    def __init__(self, cloud, arguments):
+        self._cloud, self._arguments = cloud, arguments
+        self.name, self.where = cloud.path.stem, str(cloud.path)
+        self.points, self.out = cloud.points, cloud.out
+
+    def named(self, setting):
+        """Return the option of a setting."""
+        return f"--{setting.replace('_', '-')}"
+
+    def has_group(self, name):
+        """Whether there is a group or a column of some name."""
+        return self._cloud.has(name)
+
+    def weights(self, setting, name, least=1, outside=0.0):
+        """Return the weights in the group or column that a setting names, (n,)."""
+        return read_weights(self._cloud, name, self.named(setting), least, outside)
+
+    def numbers(self, setting, name):
+        """Return the column that a setting names."""
+        return self._cloud.numbers(name, self.named(setting))
+
+    def sources(self, name):
+        """Return the points nearest to given positions or, without these, those of a group, (n,) bool."""
+        return read_sources(self._cloud, self._arguments)
+
+    def curve(self):
+        """Return the points of the curve in another file or object, (k, 3), and whether it is closed."""
+        curve, closed = Path(self._arguments.curve), self._arguments.closed
+        if clouds.kinds() and curve.suffix.lower() not in core.files.READABLE:
+            places, closed = self._cloud.owner.curve(self._arguments.curve)
+        else:
+            places = core.files.read_points(curve).points
+        return places - self._cloud.place, closed

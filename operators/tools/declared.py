@@ -1,0 +1,253 @@
+"""Blender's operators of the tools that `tools/` declares."""
+
+from types import SimpleNamespace
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
+
+from ... import core
+from ...tools.listed import listed_tools
+from ...tools.quantities import quantity
+from ...tools.settings import by_name
+from ...tools.tool import MovingTool, PointTool
+from ..objects.attributes import read_attribute, remove_numbered, tag_changed, write_attribute
+from ..objects.curves import read_curve
+from ..objects.deleting import check_deletable, keep_points
+from ..objects.groups import chosen_weights, group_kind, has_group
+from ..objects.positions import check_movable, target_property, write_positions
+from ..objects.reading import read_points
+from ..objects.result import length_text
+from ..objects.splats import has_splats
+from ..registration import Registration
+from ..running import cache
+from ..running.application import ApplicationOperator, ShownOperator, Tool, operator_reader
+from ..running.discs import disc_finder
+from .select import read_sources
+
+_FORMS = {
+    "LENGTH": {"subtype": "DISTANCE"},
+    "AREA": {"unit": "AREA"},
+    "DEGREES": {"subtype": "ANGLE"},
+    "SHARE": {"subtype": "FACTOR"},
+    "X,Y,Z": {"subtype": "XYZ"},
+}
+_KINDS = {bool: BoolProperty, int: IntProperty, float: FloatProperty, str: StringProperty, tuple: FloatVectorProperty}
+_CURVE = StringProperty(
+    name="Curve",
+    description="Curve object on the surface; each of its points is replaced by the nearest one of the cloud",
+)
+
+
+def property_of(setting):
+    """Return the property of Blender for a setting."""
+    if setting.choices:
+        items = list(map(tuple, setting.choices))  # Blender takes no named tuples
+        return EnumProperty(name=setting.title, description=setting.description, default=setting.default, items=items)
+    bounds = {"min": setting.least, "max": setting.most, "soft_max": setting.high}
+    return _KINDS[type(setting.default)](
+        name=setting.title,
+        description=setting.description,
+        default=setting.default,
+        **{name: bound for name, bound in bounds.items() if bound is not None},
+        **_FORMS.get(setting.form, {}),
+    )
+
+
+class ObjectCloud:
+    """The points of an object as a tool reads them; see `tools.tool.Cloud`."""
+
+    in_blender = True
+
+    def __init__(self, context, obj, operator, reading):
+        self._context, self._obj, self._operator = context, obj, operator
+        self.name, self.where, self.kind = obj.name, f'"{obj.name}"', group_kind(obj)
+        self.points, self.out = reading.points, cache.floating(reading.splats)
+        self.repeats = operator.is_repeated(context)
+
+    def named(self, setting):
+        """Return the label of a setting."""
+        return by_name(self._operator.tool.settings)[setting].title
+
+    def has_group(self, name):
+        """Whether the object has a group of some name."""
+        return has_group(self._obj, name)
+
+    def weights(self, setting, name, least=1, outside=0.0):
+        """Return the weights of the group that a setting names, (n,)."""
+        return chosen_weights(self._obj, name, self.named(setting), least, outside)
+
+    def numbers(self, setting, name):
+        """Return the values of the attribute that a setting names."""
+        return read_attribute(self._obj.data, name)
+
+    def sources(self, name):
+        """Return the points of a group or, if the default one is missing, the selected ones, (n,) bool."""
+        return read_sources(self._obj, name)
+
+    def curve(self):
+        """Return the points of the curve that the operator names, (k, 3), as points are read, and if it is closed."""
+        places, closed = read_curve(self._context, self._operator.curve)
+        return places - np.array(self._obj.matrix_world.translation), closed
+
+
+class Declared(Tool):
+    """The work of a declared tool on objects, by settings that are its attributes."""
+
+    tool = None
+    last = ("show",)  # names of settings that the tool does not declare
+
+    @property
+    def asks(self):
+        """Names of the settings in the dialog."""
+        curve = ("curve",) if "curve" in self.tool.reads else ()
+        asked = *curve, *self.tool.asks(self), *[setting.name for setting in self.tool.showing]
+        return (*asked, *self.last) if asked else ()
+
+    @property
+    def adjustable(self):
+        """Names of the settings in Adjust Last Operation."""
+        return *self.tool.adjustable(self), *[setting.name for setting in self.tool.showing], *self.last
+
+    @property
+    def writes(self):
+        """Names of the attributes."""
+        return self.tool.writes(self)
+
+    @property
+    def shown(self):
+        """Name of the attribute to show."""
+        return self.tool.shown(self)
+
+    def own(self):
+        """Return the values of the settings as attributes."""
+        return SimpleNamespace(**{setting.name: getattr(self, setting.name) for setting in self.tool.settings})
+
+    def plan(self, context, obj):
+        reading, operator = operator_reader(context, obj)
+        tool, own = self.tool, self.own()
+        inputs = tool.inputs(ObjectCloud(context, obj, self, reading), own)
+
+        def compute(progress):
+            laplacian = operator(progress)
+            work = lambda: tool.compute(laplacian, inputs, own, progress)  # noqa: E731
+            return laplacian.kept.result(tool.name, work, tool.key(own), inputs), laplacian, own, reading
+
+        return compute
+
+    def write(self, context, obj, result):
+        found, laplacian, own, reading = result
+        outcome = self.tool.finish(found, laplacian, own, length_text)
+        for name, values in outcome.values.items():
+            row = quantity(name)
+            if row.numbered:
+                remove_numbered(obj.data, row.attribute, beyond=len(outcome.values))
+            if row.along_surface:
+                values = reading.local_directions(values)
+            elif row.carried == "normal":
+                values = reading.local_normals(values)
+            write_attribute(obj.data, name, values)
+        tag_changed(obj.data)
+        return [f"{obj.name}: {text}" for text in (*outcome.notices, outcome.line)]
+
+
+class Pointwise(Declared):
+    """The work of a declared tool that needs the points of objects alone."""
+
+    @property
+    def last(self):
+        """Names of settings that the tool does not declare."""
+        return () if self.tool.deletes else ("show",)
+
+    def plan(self, context, obj):
+        if self.tool.deletes:
+            check_deletable(obj)
+        reading, tool, own = read_points(context, obj), self.tool, self.own()
+        inputs = tool.inputs(ObjectCloud(context, obj, self, reading), own)
+        return lambda progress: (tool.compute(reading.points, inputs, own, progress), reading.points, own, reading)
+
+    def write(self, context, obj, result):
+        found, points, own, _ = result
+        kept = self.tool.finish(found, points, own, length_text).kept
+        texts = super().write(context, obj, result)
+        if kept is not None and not kept.all():
+            keep_points(context, obj, kept)
+        return texts
+
+
+class Moving(Declared):
+    """The work of a declared tool that moves the points of objects."""
+
+    last = ("target",)
+
+    target: target_property()
+
+    @property
+    def goal(self):
+        """Where the result is written."""
+        return self.target
+
+    def plan(self, context, obj):
+        check_movable(obj, self.goal)
+        planned, carried = super().plan(context, obj), self.carries(obj)
+        find_discs = disc_finder(obj)
+
+        def compute(progress):
+            found, laplacian, own, reading = planned(progress)
+            points = self.tool.moved(found, laplacian, own)
+            gradients = core.deform.deformation_gradients(laplacian, points) if carried else None
+            shape = self.tool.shape(found)
+            discs = None if shape is None else find_discs(reading, shape, points)
+            return found, laplacian, own, reading, gradients, discs
+
+        return compute
+
+    def carries(self, obj):
+        """Whether something turns with the points, such as splats."""
+        return has_splats(obj.data)
+
+    def write(self, context, obj, result):
+        found, laplacian, own, reading, gradients, discs = result
+        outcome = self.tool.finish(found, laplacian, own, length_text)
+        title = self.tool.title(found)
+        self.put(context, write_positions(obj, reading, outcome.points, self.goal, title, gradients, discs))
+        return [f"{obj.name}: {text}" for text in (*outcome.notices, outcome.line)]
+
+    def put(self, context, key):
+        """Finish with the shape key that holds the result, if there is one."""
+
+
+def operator_of(tool, *mixins):
+    """Return the class of Blender's operator of a tool, not yet registered; `mixins` come before its own bases."""
+    properties = {setting.name: property_of(setting) for setting in (*tool.settings, *tool.showing)}
+    if "curve" in tool.reads:
+        properties["curve"] = _CURVE
+    if isinstance(tool, MovingTool):
+        bases = Moving, ApplicationOperator
+    elif isinstance(tool, PointTool):
+        bases = Pointwise, ApplicationOperator if tool.deletes else ShownOperator
+    else:
+        bases = Declared, ShownOperator
+    declared = type(
+        f"MESHFREE_OT_{tool.name}",
+        (*mixins, *bases, bpy.types.Operator),
+        {
+            "__doc__": tool.help,
+            "__module__": __name__,
+            "__annotations__": properties,
+            "bl_idname": f"meshfree.{tool.name}",
+            "bl_label": tool.label,
+            "at_zero": {setting.name: setting.at_zero for setting in tool.settings if setting.at_zero},
+            "keeps_line": tool.keeps_line,
+            "tool": tool,
+        },
+    )
+    return declared
+
+
+def registration_of(tool, *mixins):
+    """Return the registration of a tool with its rows."""
+    return Registration(operator_of(tool, *mixins), panel=tool.panel, menu=tool.menu, quick=tool.quick)
+
+
+TOOLS = tuple(registration_of(tool) for tool in listed_tools() if not tool.extended)
