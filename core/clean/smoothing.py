@@ -37,7 +37,6 @@ def smooth_points(
     keep: str | None = None,
     dirichlet: bool = False,
     progress: Progress | None = None,
-    base: Floats | None = None,
 ) -> Floats:
     """Filter the shape of the surface by frequency.
 
@@ -68,8 +67,6 @@ def smooth_points(
         filtered, with Dirichlet conditions. Otherwise a boundary shrinks as well, with Neumann conditions.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
-    base : ndarray, (n, 3), optional
-        From `smoothing_base` with the same dirichlet, to save its time.
 
     Returns
     -------
@@ -114,7 +111,7 @@ def smooth_points(
     if not (callable(response) or whole(response) < np.inf):
         raise PointCloudError(f"The response is {response!r}. Give a whole number of modes, or a function.")
     blend = PointBlend(laplacian, strength=strength, mask=mask, keep=keep, dirichlet=dirichlet)
-    base = smoothing_base(laplacian, dirichlet=dirichlet, progress=progress) if base is None else base
+    base = smoothing_base(laplacian, dirichlet=dirichlet, progress=progress)
     rest = laplacian.points - base
     if callable(response):
         if spectrum is None:
@@ -148,7 +145,6 @@ def fair_points(
     keep: str | None = None,
     dirichlet: bool = False,
     progress: Progress | None = None,
-    base: Floats | None = None,
 ) -> Floats:
     """Smooth the surface by an implicit step, without eigenvectors: for noise, also on large clouds.
 
@@ -164,7 +160,7 @@ def fair_points(
         the mean square of the smoothing lengths, which removes the noise of single points.
     order : int
         1, 2 or 3: the higher, the sharper the cutoff.
-    strength, mask, keep, dirichlet, progress, base
+    strength, mask, keep, dirichlet, progress
         As in `smooth_points`.
 
     Returns
@@ -216,7 +212,6 @@ def fair_points(
         keep=keep,
         dirichlet=dirichlet,
         progress=progress,
-        base=base,
     )
 
 
@@ -363,6 +358,11 @@ def smoothing_base(laplacian: LaplaceBeltrami, *, dirichlet: bool = False, progr
     SolverError
         The solver did not converge.
     """
+    return laplacian.kept.result("smoothing base", lambda: _base(laplacian, dirichlet, progress), dirichlet)
+
+
+def _base(laplacian: LaplaceBeltrami, dirichlet: bool, progress: Progress | None) -> Floats:
+    """Compute what `smoothing_base` returns."""
     points, component = laplacian.points, laplacian.component
     base = points.copy()
     known = component >= 0

@@ -408,14 +408,14 @@ class TestWriting:
 
     def test_splats_bend_with_the_surface(self, core, run, tmp_path):
         bar = bar_splats(core)
-        core.write_splats(tmp_path / "a.ply", bar)
+        core.splats.write_splats(tmp_path / "a.ply", bar)
         given = "mode-shape", tmp_path / "a.ply", "--amplitude", 0.2
         assert run(*given, "--out", tmp_path / "b.ply")[0] == 0
         assert run("convert", tmp_path / "a.ply", "--out", tmp_path / "a.blend")[0] == 0
         code, [line] = run("mode-shape", tmp_path / "a.blend", "--amplitude", 0.2, "--out", tmp_path / "b.blend")
         assert code == 0, line
         assert run("convert", tmp_path / "b.blend", "--out", tmp_path / "c.ply")[0] == 0
-        wanted, found = (core.read_splats(tmp_path / f"{name}.ply") for name in "bc")
+        wanted, found = (core.splats.read_splats(tmp_path / f"{name}.ply") for name in "bc")
         assert np.abs(found.positions - bar.positions).max() > 0.1
         assert_allclose(found.positions, wanted.positions, atol=1e-4)
         assert_allclose(found.covariances, wanted.covariances, atol=1e-5)

@@ -379,6 +379,8 @@ def check_dialog(name):
     texts = []
     for variant in [{}, *variants, *({item.identifier: True} for item in properties if item.type == "BOOLEAN")]:
         settings = settings_of(operator, layout=Layout(texts), at_zero={}, **values | variant | hidden)
+        if not settings.asks:
+            return
         operator.draw(settings, bpy.context)
     assert {text for text in texts if " " not in text} == set(values), name
 

@@ -20,7 +20,7 @@ CLASSES = {
     *("deform.Deformer", "measure.Slopes", "measure.SurfaceMeasures"),
     *("motion.Heat", "motion.ReactionDiffusion", "motion.Wave", "rig.Skinner"),
 }
-METHODS = {"LaplaceBeltrami.apply", "LaplaceBeltrami.eigenpairs", "LaplaceBeltrami.toward"}
+METHODS = {f"LaplaceBeltrami.{name}" for name in ("apply", "eigenpairs", "release", "toward")}
 FUNCTIONS = {name for name, one in PUBLIC.items() if inspect.isfunction(one)}
 SHOWN = sorted(CLASSES | METHODS | FUNCTIONS - WITHOUT)
 SECTIONS = ["Parameters", "Attributes", "Returns", "Raises", "See Also", "Notes", "References", "Examples"]

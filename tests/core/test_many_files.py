@@ -15,7 +15,7 @@ import pytest
 
 import core
 from benchmarks.samplings import fibonacci_sphere
-from command import records, verbs
+from command import records, tool_verb, verbs
 from command.main import run as run_command
 
 ROOT = Path(__file__).parents[2]
@@ -338,7 +338,7 @@ class TestBefore:
             raise AssertionError("it works")
 
         monkeypatch.setattr(verbs.Info, "work", fail)
-        monkeypatch.setattr(verbs.ThinOut, "work", fail)
+        monkeypatch.setattr(tool_verb.PointVerb, "work", fail)
 
     @pytest.mark.parametrize("option", ["--out-dir", "--out", "--report", "--out is a folder"])
     def test_outputs_that_cannot_be_written(self, folder, capsys, option):
