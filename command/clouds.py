@@ -254,7 +254,7 @@ def write(path, given, results, arrays=None, numbers=None) -> list:
     if path.suffix.lower() == ".npz":
         points = np.asarray(given.positions if splats else given.points, dtype=np.float64)
         named = {name.removeprefix(quantities.PREFIX): values for name, values in (results | (numbers or {})).items()}
-        save_arrays(path, {"points": points, **named} if arrays is None else arrays)
+        core.files.write_arrays(path, {"points": points, **named} if arrays is None else arrays)
         return []
     if splats:
         if path.suffix.lower() != ".ply":
@@ -301,9 +301,3 @@ def with_columns(splats, results):
     for name, values in results.items():
         columns.update(core.files.split_columns(name, values))
     return replace(splats, file=file._replace(columns=columns))
-
-
-def save_arrays(path, arrays):
-    """Write arrays by name; an older file is kept if that fails."""
-    with core.files.replacing(path) as part, part.open("wb") as file:  # to a path, numpy would add its own ending
-        np.savez(file, **arrays)

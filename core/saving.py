@@ -10,7 +10,7 @@ from scipy import sparse
 
 from .arguments import as_path
 from .errors import InvalidPointsError, PointCloudError
-from .files import reading, replacing
+from .files import reading, write_arrays
 from .geometry import Agreed
 from .operator import LaplaceBeltrami
 from .options import LaplacianOptions
@@ -66,8 +66,7 @@ def save(laplacian: LaplaceBeltrami, path: FilePath) -> None:
         else:
             told[name] = value
     arrays["told"] = np.array(json.dumps(told, default=_plain))
-    with replacing(path) as temporary, open(temporary, "wb") as file:
-        np.savez(file, **arrays)  # type: ignore[arg-type]
+    write_arrays(path, arrays)
 
 
 def load(path: FilePath) -> LaplaceBeltrami:

@@ -1,5 +1,6 @@
 """Point files to arrays in double precision and back, usable outside Blender: numpy only, and laspy for LAS and LAZ."""
 
+from .arrays import write_arrays as write_arrays
 from .digits import Digits as Digits
 from .digits import join_digits as join_digits
 from .digits import split_digits as split_digits

@@ -1,8 +1,8 @@
-"""Arrays of numpy, alone (.npy) or several in an archive (.npz), read without running any code of the file."""
+"""Arrays of numpy, alone (.npy) or several in an archive (.npz), read and written without pickles."""
 
 import re
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from typing import IO, Any
@@ -10,10 +10,11 @@ from typing import IO, Any
 import numpy as np
 
 from ..errors import InvalidPointsError
-from ..types import Array
+from ..types import Array, FilePath
 from .lines import brief
 from .rows import unpacks_too_far
 from .table import PointTable
+from .whole import replacing
 
 _MAGIC = b"\x93NUMPY"
 _LONGEST = 10_000  # bytes of a header, as numpy's own
@@ -62,6 +63,25 @@ def array_pieces(
             parts = [np.frombuffer(stream.read(rows * width * dtype.itemsize), dtype) for stream in streams]
             values = np.concatenate([part.reshape(rows, width) for part in parts], axis=1, dtype=np.float64)
             yield PointTable(values, single=dtype == np.float32), {}
+
+
+def write_arrays(path: FilePath, arrays: Mapping[str, Array]) -> None:
+    """Write arrays by name to an archive. An older one stays if that fails.
+
+    Parameters
+    ----------
+    path : path-like
+    arrays : mapping of str to ndarray
+
+    Raises
+    ------
+    PointCloudError
+        The file cannot be written.
+    """
+    with replacing(path) as part, zipfile.ZipFile(part, "w") as archive:
+        for name, values in arrays.items():  # as numpy.savez, which leaves the archive open where the disk is full
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
+                np.lib.format.write_array(file, np.asanyarray(values), allow_pickle=False)  # type: ignore[no-untyped-call]
 
 
 def _entry(archive: zipfile.ZipFile, path: Path, size: int) -> zipfile.ZipInfo:

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..arguments import as_path
 from ..errors import NotEnoughMemoryError, PointCloudError
-from ..files import replacing
+from ..files import replacing, write_arrays
 from ..options import LaplacianOptions
 from ..types import Array, FilePath, Floats
 from .shelf import Part, Record, Told, visited
@@ -93,7 +93,7 @@ class Store:
 
     def settle(self, step: str, record: Record) -> None:
         """Keep what all tiles agree on after a step."""
-        _save(self._agreed(step), record)
+        write_arrays(self._agreed(step), record)
         self.record = {**self.record, **record}
 
     def part(self, number: int) -> Part:
@@ -175,7 +175,7 @@ class Store:
             path = self._tile(number) / f"state-{place:02d}-{step}.pickle"
             with replacing(path) as part:
                 _save_state(part, state)
-        _save(self._path(step, number), told)
+        write_arrays(self._path(step, number), told)
         if state is not None:
             for path in before:
                 path.unlink(missing_ok=True)
@@ -236,11 +236,6 @@ class Store:
 def tile_folder(folder: FilePath, number: int) -> Path:
     """Return the folder of a tile in that of a store."""
     return as_path(folder) / f"{number:06d}"
-
-
-def _save(path: Path, arrays: Any) -> None:
-    with replacing(path) as part:
-        np.savez(part, **arrays)
 
 
 def _save_state(path: Path, state: Any) -> None:

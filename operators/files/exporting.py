@@ -9,11 +9,10 @@ from bpy_extras.io_utils import ExportHelper
 
 from ... import core
 from ...command import analysis
-from ...command.clouds import save_arrays
 from ...command.rows import write_rows, write_text
 from ...command.svg import profile_picture
 from ...core import PointCloudError
-from ...core.files import WRITABLE, replacing, write_points
+from ...core.files import WRITABLE, replacing, write_arrays, write_points
 from ..objects.options import laplacian_options
 from ..objects.parts import kept_rows
 from ..objects.place import place_of
@@ -172,7 +171,7 @@ class MESHFREE_OT_export_operator(ExportOperator, bpy.types.Operator):
             built = build_operator(reading, options, progress)
             spectrum = cache.lowest_modes(built.laplacian, count, progress) if count else None
             progress("Write", 1.0)
-            save_arrays(path, analysis.arrays(place, built, spectrum))
+            write_arrays(path, analysis.arrays(place, built, spectrum))
             return f"{name}: {built.laplacian.stiffness.nnz:,} weights and {count} modes written to {path.name}"
 
         return write

@@ -48,6 +48,7 @@ CALLS = {
     "chunks": lambda path: [len(points) for points, _ in files.chunks(path("b.csv"), 25)],
     "extent": lambda path: files.extent(path("b.csv")).count,
     "has_levels": lambda path: files.has_levels(path("b.csv")),
+    "write_arrays": lambda path: files.write_arrays(path("e.npz"), {"points": SAMPLE, "file": SAMPLE}),
     "write_mesh": lambda path: files.write_mesh(path("c.obj"), PointTable(SAMPLE), [np.array([[0, 1, 2]])]),
     "join_pieces": lambda path: files.join_pieces([(SAMPLE, {})], path("a.ply")).points.shape,
     "write_vertex_columns": lambda path: files.write_vertex_columns(path("d.ply"), COLUMNS),

@@ -20,7 +20,8 @@ posix = pytest.mark.skipif(os.name == "nt", reason="Windows has no such locks, l
 def run(code, *arguments):
     """Start a process that runs some lines, and hands over its standard output."""
     given = [sys.executable, "-c", code, *map(str, arguments)]
-    return subprocess.Popen(given, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    streams = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+    return subprocess.Popen(given, cwd=ROOT, text=True, **streams)
 
 
 HELD = """
@@ -40,25 +41,31 @@ class TestFullDisk:
 import resource, signal, sys
 from pathlib import Path
 import numpy as np
-from core.files import PointTable, write_points
+from core.files import PointTable, write_arrays, write_points
 from core.tiles import cut_to_store
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 points = np.random.default_rng(0).random((20000, 3))
 resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
 path = Path(sys.argv[1])
 try:
-    cut_to_store(lambda: [(points, {})], path, 9000) if path.name == "store" else write_points(path, PointTable(points))
+    if path.name == "store":
+        cut_to_store(lambda: [(points, {})], path, 9000)
+    elif path.suffix == ".npz":
+        write_arrays(path, {"few": points[:9], "points": points})
+    else:
+        write_points(path, PointTable(points))
 except ValueError as error:
     print(type(error).__name__, error.__cause__.errno, error)
 """
 
-    @pytest.mark.parametrize("name", ["a.ply", "a.xyz", "a.csv", "store"])
+    @pytest.mark.parametrize("name", ["a.ply", "a.xyz", "a.csv", "a.npz", "store"])
     def test_nothing_is_left_under_the_final_name(self, tmp_path, name):
         """At the system's limit for the size of a file, which a write may reach in its middle."""
-        told, _ = run(self.FULL, tmp_path / name).communicate()
+        told, aside = run(self.FULL, tmp_path / name).communicate()
         kind, number, *_ = told.split()
         assert (kind, int(number) in (errno.ENOSPC, errno.EFBIG)) == ("PointCloudError", True)
         assert f"{tmp_path / name} cannot be written" in told
+        assert aside == ""
         assert list(tmp_path.iterdir()) == []
 
     def test_an_older_file_stays(self, tmp_path):
