@@ -86,3 +86,10 @@ def tell_aside(text):
         print(text, file=sys.stderr, flush=True)
     except BrokenPipeError:
         sys.stderr = open(os.devnull, "w")  # noqa: SIM115
+
+
+def silence(stream):
+    """Lead nowhere what is still to be written to a stream, which would fail once more at the end."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)

@@ -2,7 +2,7 @@
 
 import bpy
 
-from ...command import clouds, main, verbs
+from ...command import clouds, line, verbs
 from . import blend, weight_verbs
 
 _handles = []
@@ -28,4 +28,4 @@ def make_verbs():
 
 def run(argv) -> int:
     """Run the command line with what follows ``--command meshfree``, and return the exit code."""
-    return main.run(argv, make_verbs(), "blender --command meshfree")
+    return line.run(argv, make_verbs(), "blender --command meshfree")

@@ -19,7 +19,7 @@ from benchmarks.samplings import (
     uneven_sphere,
 )
 from command import verbs
-from command.main import run as run_command
+from command.line import run as run_command
 from tests.wheel_name import put_in_place
 
 put_in_place()

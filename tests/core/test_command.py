@@ -12,7 +12,7 @@ import core
 from benchmarks.samplings import fibonacci_sphere, square_grid
 from command import verbs
 from command.colors import linear
-from command.main import run as run_command
+from command.line import run as run_command
 from command.meshing import close_gaps
 from core.files import PointTable, read_points, write_points
 from tools.quantities import rows_of
@@ -428,6 +428,6 @@ def test_every_verb_explains_itself(run, verb, capsys):
 
 
 def test_the_command_line_starts_without_scipy():
-    code = "import sys; from command import main, verbs; verbs.make_verbs(); print('scipy' in sys.modules)"
+    code = "import sys; from command import line, verbs; verbs.make_verbs(); print('scipy' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).parents[2], capture_output=True, text=True)
     assert done.stdout == "False\n", done.stderr

@@ -16,7 +16,7 @@ import pytest
 import core
 from benchmarks.samplings import fibonacci_sphere
 from command import records, tool_verb, verbs
-from command.main import run as run_command
+from command.line import run as run_command
 
 ROOT = Path(__file__).parents[2]
 POINTS = fibonacci_sphere(200)
@@ -228,12 +228,12 @@ class TestReports:
 
     def test_files_are_reached_by_the_last_settings_only(self, run, folder, monkeypatch):
         self.thin(run, folder)
-        monkeypatch.setattr("command.main._do", lambda *_: 3)
+        monkeypatch.setattr("command.line._do", lambda *_: 3)
         self.thin(run, folder, "--skip-done")
         assert run_command(["report", str(folder / "r")], verbs.make_verbs(), "meshfree") == 3
         monkeypatch.undo()
         assert run("report", folder / "r")[1][0]["unreached"] == 0
-        monkeypatch.setattr("command.main._do", lambda *_: 3)
+        monkeypatch.setattr("command.line._do", lambda *_: 3)
         self.thin(run, folder, "--count", 40)
         monkeypatch.undo()
         assert run("report", folder / "r")[1][0]["unreached"] == 8
@@ -458,6 +458,20 @@ class TestEnds:
         assert (running.returncode, told.splitlines()[-1]) == (130, "Stopped")
         assert "Traceback" not in told
         assert not (folder / "out.ply").exists()
+
+    @pytest.mark.parametrize("module", ["numpy", "command.line", "command.tile_verbs"])
+    def test_ctrl_c_while_modules_load(self, module):
+        code = f"""
+class Stop:
+    def find_spec(self, name, *_):
+        if name == {module!r}:
+            signal.raise_signal(signal.SIGINT)
+sys.meta_path.insert(0, Stop())
+"""
+        start, end = self.CODE.split("; ", 1)
+        given = [sys.executable, "-c", f"{start}{code}{end}", "--version"]
+        done = subprocess.run(given, cwd=ROOT, text=True, capture_output=True)
+        assert (done.returncode, done.stdout, done.stderr) == (130, "", "Stopped\n")
 
     @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="this system has no /dev/full")
     def test_standard_output_on_a_full_disk(self, folder):

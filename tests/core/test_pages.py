@@ -12,7 +12,7 @@ import pytest
 
 from benchmarks.samplings import fibonacci_sphere
 from command import verbs
-from command.main import run
+from command.line import run
 from core.files import PointTable, write_points
 from tests.core.copc_files import write_copc
 from tests.pages import NOT_RUN, ROOT, snippets, typed

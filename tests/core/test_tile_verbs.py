@@ -11,7 +11,7 @@ import pytest
 
 import core
 from command import tile_verbs, tile_work, verbs
-from command.main import run as run_command
+from command.line import run as run_command
 from command.stages import ToldStages
 from core.files import PointTable, read_points, write_points
 from tests.core import e57_files

@@ -10,7 +10,7 @@ import core
 from benchmarks.samplings import fibonacci_sphere, random_sphere, square_grid
 from command import colors, motions, verbs
 from command.cloud_verb import CloudVerb
-from command.main import run as run_command
+from command.line import run as run_command
 from core.files import PointTable, read_points, write_points
 from tests.core.test_command import FAR, write
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import meshfree_laplacian as mf
 import numpy as np
-from meshfree_laplacian.command.main import run
+from meshfree_laplacian.command.line import run
 from meshfree_laplacian.command.verbs import make_verbs
 
 COUNT = 500  # points
