@@ -1,7 +1,6 @@
 """Which files a command line reads and writes."""
 
 import argparse
-import importlib
 import re
 import sys
 import tempfile
@@ -129,21 +128,10 @@ def check_outputs(verb, arguments):
         if path.is_dir():
             raise core.PointCloudError(f"{path} is a folder. Choose another name.")
     if any(path.suffix.lower() in core.files.SCANS for path in written):
-        check_scans()
+        core.files.import_las()
     for folder, path in folders.items():
         with core.files.writing(path):
             tempfile.TemporaryFile(dir=next(home for home in (folder, *folder.parents) if home.exists())).close()
-
-
-def check_scans():
-    """Refuse LAS and LAZ files where a package for them is missing, with a PointCloudError."""
-    for name in ("laspy", "lazrs"):
-        try:
-            importlib.import_module(name)
-        except ImportError as error:
-            raise core.PointCloudError(
-                f"LAS and LAZ files need laspy and lazrs, and {name} is missing. Install both, or take another format."
-            ) from error
 
 
 def check_beside(parser, arguments, option):

@@ -72,9 +72,7 @@ def _others_at_work(arguments, stack) -> list:
     number, count = arguments.part
     if not arguments.out_dir.exists():
         stack.callback(_delete_empty, arguments.out_dir)
-    with core.files.writing(arguments.out_dir):
-        arguments.out_dir.mkdir(parents=True, exist_ok=True)
-        alone = stack.enter_context(core.files.holding(arguments.out_dir / f".share-{number}-of-{count}.lock"))
+    alone = stack.enter_context(core.files.holding_folder(arguments.out_dir, f".share-{number}-of-{count}.lock"))
     return [] if alone else [f"Another run is at work on the same share of {arguments.out_dir}."]
 
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import core
-from .sections import UP
+from .sections import UP, add_normal
 from .settings import place
 
 OVER = "point cloud over whose surface the volumes of all parts are measured: fill above, and cut below it"
@@ -221,12 +221,7 @@ def add_base(parser):
         metavar="X,Y,Z",
         help="measure the volume of every part over a plane through this position, in the coordinates of the file",
     )
-    parser.add_argument(
-        "--normal",
-        type=place,
-        metavar="X,Y,Z",
-        help="vector across the plane, to what counts as above, along which heights over --reference are; else upwards",
-    )
+    add_normal(parser, ", to what counts as above, along which heights over --reference are")
 
 
 def check_base(parser, arguments):

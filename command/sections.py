@@ -9,9 +9,14 @@ _CURVES = "curve,closed,x,y,z", ["%d", "%d", "%.17g", "%.17g", "%.17g"]  # colum
 UP = np.array([0.0, 0.0, 1.0])
 
 
+def add_normal(parser, more=""):
+    """Add the option for the normal of a plane, with `more` on it."""
+    parser.add_argument("--normal", type=place, metavar="X,Y,Z", help=f"vector across the plane{more}; else upwards")
+
+
 def add_options(parser, unless=""):
     """Add the options for the normal of the plane, `unless` something else gives it, and for the curves."""
-    parser.add_argument("--normal", type=place, metavar="X,Y,Z", help=f"vector across the plane{unless}; else upwards")
+    add_normal(parser, unless)
     parser.add_argument(
         "--curves", action="store_true", help="write the corners of the curves, too, beside the output: _curves.csv"
     )

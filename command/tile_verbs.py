@@ -1,7 +1,6 @@
 """The verbs for clouds larger than memory: `tiles run`, and its stages one by one."""
 
 import argparse
-import contextlib
 import json
 import shutil
 import time
@@ -9,7 +8,7 @@ from dataclasses import fields
 from pathlib import Path
 
 from . import core, tile_choices, tile_work
-from .inputs import add_choices, check_scans, files_in, las_choices, parse_share
+from .inputs import add_choices, files_in, las_choices, parse_share
 from .records import SUFFIX, stamp
 from .rows import TABLES, write_rows, write_text
 from .settings import LAPLACIAN, add_setting, chosen
@@ -24,6 +23,7 @@ _CHOICES = ("classes", "withheld", "meters", "columns", "bounds", "level")  # op
 _SIZES = ("memory", "tile_points")  # options for how large tiles are
 _ONE_FILES = "one_files.json"  # in the store: which files of all results were written
 _REPORT = f"tiles{SUFFIX}"  # in the folder of a run
+_LOCK = ".run.lock"  # beside it
 
 
 class _TileVerb(Verb):
@@ -105,18 +105,6 @@ class _Cutting(_TileVerb):
         tile_choices.check_measures(parser, arguments)
         arguments.sources, arguments.inputs = arguments.inputs, [arguments.folder]
 
-    @contextlib.contextmanager
-    def alone(self, arguments):
-        """Refuse to work in a folder in which another run does."""
-        with core.files.writing(arguments.folder):
-            arguments.folder.mkdir(parents=True, exist_ok=True)
-            with core.files.holding(arguments.folder / ".run.lock") as alone:
-                if not alone:
-                    raise core.PointCloudError(
-                        f"Another run is at work in {arguments.folder}. Wait until it ends, or choose another folder."
-                    )
-                yield
-
     def cut(self, arguments, count, progress):
         """Return the store of a folder, for so many workers, and the notices of what was read; cut it if need be."""
         given = chosen(_SETTINGS, arguments)
@@ -124,7 +112,7 @@ class _Cutting(_TileVerb):
             **{name: value.lower() if isinstance(value, str) else value for name, value in given.items()}
         )
         if any(path.suffix.lower() in core.files.SCANS for path in arguments.sources):
-            check_scans()
+            core.files.import_las()
         folder, memory = arguments.folder / STORE, arguments.memory or core.tiles.memory_of_worker(count)
         known = {
             "sources": [str(path.resolve()) for path in arguments.sources],
@@ -256,7 +244,7 @@ class TilesRun(_Cutting):
         _check_modes(parser, arguments, 0)
 
     def run(self, path, arguments, output):
-        with self.alone(arguments), _ToldTiles(self.name, _EACH) as stages:
+        with core.files.alone_in(arguments.folder, _LOCK), _ToldTiles(self.name, _EACH) as stages:
             tile_work.check_workers(arguments.workers, arguments.scheduler, path)
             store, notices = self.cut(arguments, arguments.workers, _share(stages, 0.0, _READ))
             if arguments.modes:
@@ -320,7 +308,7 @@ class TilesCut(_Cutting):
     help = "cut a cloud larger than memory into tiles, the first stage"
 
     def run(self, path, arguments, output):
-        with self.alone(arguments), ToldStages(self.name, _EACH) as stages:
+        with core.files.alone_in(arguments.folder, _LOCK), ToldStages(self.name, _EACH) as stages:
             store, notices = self.cut(arguments, 1, stages)
         errors = tile_work.file_records(store)
         broken = [{"file": record["file"], "error": record["error"]} for record in errors]

@@ -1,6 +1,8 @@
 """Point files to arrays in double precision and back, usable outside Blender: numpy only, and laspy for LAS and LAZ."""
 
 from .arrays import write_arrays as write_arrays
+from .digits import LARGEST_SINGLE as LARGEST_SINGLE
+from .digits import SMALLEST_SINGLE as SMALLEST_SINGLE
 from .digits import Digits as Digits
 from .digits import join_digits as join_digits
 from .digits import split_digits as split_digits
@@ -22,6 +24,7 @@ from .las_choices import LasChoices as LasChoices
 from .las_choices import parse_classes as parse_classes
 from .las_form import LasForm as LasForm
 from .las_form import join_forms as join_forms
+from .las_packages import import_las as import_las
 from .lines import brief as brief
 from .mesh import MESHES as MESHES
 from .mesh import write_mesh as write_mesh
@@ -48,6 +51,8 @@ from .table import check_places as check_places
 from .table import full_color as full_color
 from .table import split_columns as split_columns
 from .table import unit_colors as unit_colors
+from .whole import alone_in as alone_in
 from .whole import holding as holding
+from .whole import holding_folder as holding_folder
 from .whole import replacing as replacing
 from .whole import writing as writing

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import InvalidPointsError
 from ..types import Array, Floats
+from .las_packages import import_las
 from .las_packing import PackedChunk
 
 Box: TypeAlias = tuple[Floats, Floats]  # the lowest and the highest corner
@@ -110,8 +111,7 @@ def records_of(file: BinaryIO, header: Any, nodes: Sequence[PackedChunk], size: 
     size : int
         How many points are read at once, unless one node has more.
     """
-    import laspy
-    import lazrs
+    laspy, lazrs = import_las()
 
     (packing,) = (detail.record_data for detail in header.vlrs.get("LasZipVlr"))
     everything = laspy.DecompressionSelection.all().to_lazrs()

@@ -9,7 +9,7 @@ from ..types import Array, Floats, Ints
 
 _WHOLE = 2**31  # of a whole number of Blender, 32 bits with a sign
 _EXACT = 2**53  # beyond this, doubles are no longer all whole numbers
-_LARGEST, _SMALLEST = float(np.finfo(np.float32).max), float(np.finfo(np.float32).tiny)
+LARGEST_SINGLE, SMALLEST_SINGLE = float(np.finfo(np.float32).max), float(np.finfo(np.float32).tiny)
 _MOST_DECIMALS = 9  # that are looked for, and ...
 _MEANT = 6  # ... that numbers have because they were measured so; more come out of a computation
 _SINGLE = 9  # digits with which single precision is written
@@ -163,7 +163,7 @@ def _significant(single: Array) -> Floats:
 
 def _split_floats(values: Floats, known: Digits | None) -> tuple[list[Array], Digits | None]:
     finite = values[np.isfinite(values)]
-    if len(finite) == 0 or np.abs(finite).max() > _LARGEST:
+    if len(finite) == 0 or np.abs(finite).max() > LARGEST_SINGLE:
         return [values], None
     decimals = _decimals(finite)
     if decimals == 0 and len(finite) == len(values):
@@ -181,7 +181,7 @@ def _split_floats(values: Floats, known: Digits | None) -> tuple[list[Array], Di
 
 def _split_vectors(values: Floats) -> tuple[list[Floats], Digits | None]:
     finite = values[np.isfinite(values).all(axis=1)]
-    if values.dtype != np.float64 or len(finite) == 0 or np.abs(finite).max() > _LARGEST:
+    if values.dtype != np.float64 or len(finite) == 0 or np.abs(finite).max() > LARGEST_SINGLE:
         return [values], None
     offsets = [0.0 if _is_kept(axis) or _is_plain(axis) else _float_offset(axis) for axis in finite.T]
     return ([values - offsets], Digits(offsets)) if any(offsets) else ([values], None)
@@ -201,7 +201,7 @@ def _decimals(values: Floats) -> int | None:
 def _float_offset(values: Floats) -> float:
     """Return the middle of numbers, rounded to a power of ten below their extent; zero if that does not help."""
     low, high = float(values.min()), float(values.max())
-    if high - low < _SMALLEST:
+    if high - low < SMALLEST_SINGLE:
         return low
     offset = float(np.round(0.5 * low + 0.5 * high, -int(np.floor(np.log10(high - low)))))
     left = max(high - offset, offset - low)
@@ -227,7 +227,7 @@ def _is_fine(values: Floats, offset: float, decimals: int | None, finest: float 
         if decimals <= _MEANT:
             return False
     step, extent = float(np.spacing(np.abs(single).max())), float(np.ptp(values))
-    if extent < _SMALLEST:
+    if extent < SMALLEST_SINGLE:
         return step <= _FINEST
     gaps = np.diff(np.unique(values))
     return step <= min(_FINE * extent, 0.5 * float(np.median(gaps)), finest)

@@ -1,4 +1,4 @@
-"""LAS and LAZ, the files of laser scanners: by laspy and lazrs, which are imported only as such files are read."""
+"""LAS and LAZ, the files of laser scanners, by laspy and lazrs."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -8,11 +8,12 @@ from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
-from ..errors import PointCloudError, TooFewPointsError
+from ..errors import TooFewPointsError
 from ..types import Array, Bools, Floats
 from .copc import Box, Octree, read_octree, records_of
 from .las_choices import LasChoices
 from .las_form import SYSTEM, LasForm, read_form
+from .las_packages import import_las
 from .las_packing import PackedChunk, check_header, check_size, records_after
 from .reference import Reference, read_reference
 from .rows import too_short
@@ -137,13 +138,7 @@ def opened_las(path: Path) -> Iterator[LasFile]:
     PointCloudError
         laspy or lazrs is missing, or the file is broken.
     """
-    try:
-        import laspy
-        import lazrs
-    except ImportError as error:
-        raise PointCloudError(
-            f"{path} cannot be read: {error.name} is missing. Install laspy and lazrs, or export the points as PLY."
-        ) from error
+    laspy, lazrs = import_las()
     with open(path, "rb") as file:
         check_header(file, path)
         try:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
 from ..errors import InvalidPointsError
+from .las_packages import import_las
 from .rows import unpacks_too_far
 
 _SHORTEST = 227  # bytes of a header
@@ -86,8 +87,7 @@ def _check_packing(file: BinaryIO, begin: int, size: int, header: Any, path: Pat
 
     lazrs allocates memory for whatever a file states, and aborts the whole program where there is too little.
     """
-    import lazrs
-
+    _, lazrs = import_las()
     found = [detail.record_data for detail in header.vlrs.get("LasZipVlr")]
     kind, items = (0, []) if not found else _read_items(found[0])
     wanted = [size for number, size, _ in items if number in _ITEMS and _ITEMS[number][0] != size]

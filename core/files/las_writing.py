@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import PointCloudError
 from ..types import Array, Bools, Floats
 from .las_form import FULL, TIME, WKT, LasForm
+from .las_packages import import_las
 from .ranges import ColumnPieces, Columns, Range, ranges_of
 from .table import AXES, CHANNELS, NORMALS
 
@@ -62,13 +62,7 @@ def write_las(path: Path, pieces: ColumnPieces, name: str, form: LasForm | None 
     PointCloudError
         laspy or lazrs is missing.
     """
-    try:
-        import laspy
-        import lazrs  # noqa: F401
-    except ImportError as error:
-        raise PointCloudError(
-            f"{name} cannot be written: {error.name} is missing. Install laspy and lazrs, or choose another format."
-        ) from error
+    laspy, _ = import_las()
     ranges, on_steps = _looked_at(pieces, form)
     low, high = np.array([[ranges[axis].low, ranges[axis].high] for axis in AXES], dtype=np.float64).T
     kind = _point_format({number: laspy.PointFormat(number) for number in (*_LEGACY, *_EXTENDED)}, ranges, form)

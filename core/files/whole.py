@@ -5,7 +5,7 @@ import os
 import re
 import secrets
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from ..arguments import as_path
@@ -106,6 +106,38 @@ def holding(path: FilePath) -> Iterator[bool]:
                 path.unlink(missing_ok=True)
     finally:
         os.close(file)
+
+
+@contextmanager
+def holding_folder(folder: FilePath, lock: str) -> Iterator[bool]:
+    """Hold a file of some name in a folder, which is made if it is missing; see `holding`.
+
+    Raises
+    ------
+    PointCloudError
+        The folder cannot be written to.
+    """
+    folder = as_path(folder)
+    with ExitStack() as stack:
+        with writing(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+            alone = stack.enter_context(holding(folder / lock))
+        yield alone
+
+
+@contextmanager
+def alone_in(folder: FilePath, lock: str) -> Iterator[None]:
+    """Hold a file of some name in a folder, as `holding_folder`, and refuse to go on where another process does.
+
+    Raises
+    ------
+    PointCloudError
+        It does, or the folder cannot be written to.
+    """
+    with holding_folder(folder, lock) as alone:
+        if not alone:
+            raise PointCloudError(f"Another run is at work in {folder}. Wait until it ends, or choose another folder.")
+        yield
 
 
 def _open(path: Path) -> int:

@@ -6,6 +6,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
 
+from ..files import LARGEST_SINGLE, SMALLEST_SINGLE
 from ..types import Array, Floats
 
 PLACES = ("x", "y", "z")
@@ -16,8 +17,6 @@ ROTATIONS = tuple(f"rot_{number}" for number in range(4))
 NEEDED = (*PLACES, *COLORS, OPACITY, *SCALES, *ROTATIONS)
 REST = "f_rest_"  # the harmonics, channel by channel
 LENGTHS = ("filter_3D",)  # further columns that are lengths: the filter of Mip-Splatting
-_SMALLEST = float(np.finfo(np.float32).tiny)
-_LARGEST = float(np.finfo(np.float32).max)
 _NEAR = 2.0**-25  # half a step of single precision below one
 
 
@@ -67,12 +66,12 @@ def rest_names(per_channel: int, used: int) -> list[str]:
 def decode_scales(logarithms: Floats) -> Floats:
     """Return half axes of their logarithms; zero for NaN."""
     with np.errstate(over="ignore"):
-        return np.nan_to_num(np.exp(logarithms), nan=0.0, posinf=_LARGEST)
+        return np.nan_to_num(np.exp(logarithms), nan=0.0, posinf=LARGEST_SINGLE)
 
 
 def encode_scales(scales: Floats) -> Floats:
     """Return the logarithms of half axes; for zero that of the smallest number."""
-    return np.log(np.maximum(scales, _SMALLEST))
+    return np.log(np.maximum(scales, SMALLEST_SINGLE))
 
 
 def decode_opacities(logits: Floats) -> Floats:
@@ -83,7 +82,7 @@ def decode_opacities(logits: Floats) -> Floats:
 
 def encode_opacities(opacities: ArrayLike) -> Array:
     """Return the logits of opacities, finite ones of 0 and 1, too."""
-    inside = np.clip(opacities, _SMALLEST, 1.0 - _NEAR)
+    inside = np.clip(opacities, SMALLEST_SINGLE, 1.0 - _NEAR)
     return np.log(inside) - np.log1p(-inside)
 
 

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from ..arguments import as_path
 from ..errors import InvalidPointsError, NotEnoughMemoryError, PointCloudError, TooFewPointsError
-from ..files import holding, writing
+from ..files import alone_in, writing
 from ..geometry import check_points
 from ..memory import needed_memory
 from ..options import LaplacianOptions
@@ -110,21 +110,17 @@ def cut_to_store(
     fitting = None if memory is None else memory // needed_memory(1, options)
     plan = _plan(counted, _tiles(counted.count, most, halo, workers), halo, fitting)
     building = folder.with_name(f".{folder.name}.part")
-    with writing(folder):
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with holding(folder.with_name(f".{folder.name}.lock")) as alone:
-            if not alone:
-                raise PointCloudError(f"Another process is at work on {folder}. Wait for it, or choose another folder.")
-            try:
-                shutil.rmtree(building, ignore_errors=True)  # of a cut that was killed
-                building.mkdir()
-                sizes = _spread(chunks(), building, plan, counted)
-                agreed = {"center": counted.center, "scale": counted.scale, **sides, **asked}
-                left_out = {"columns left out": counted.left_out, "halo": halo, "memory": memory}
-                write_manifest(building, options, sizes, agreed, {**(known or {}), **left_out, "points": counted.count})
-                os.replace(building, folder)
-            finally:
-                shutil.rmtree(building, ignore_errors=True)  # it may be what has filled the disk
+    with alone_in(folder.parent, f".{folder.name}.lock"), writing(folder):
+        try:
+            shutil.rmtree(building, ignore_errors=True)  # of a cut that was killed
+            building.mkdir()
+            sizes = _spread(chunks(), building, plan, counted)
+            agreed = {"center": counted.center, "scale": counted.scale, **sides, **asked}
+            left_out = {"columns left out": counted.left_out, "halo": halo, "memory": memory}
+            write_manifest(building, options, sizes, agreed, {**(known or {}), **left_out, "points": counted.count})
+            os.replace(building, folder)
+        finally:
+            shutil.rmtree(building, ignore_errors=True)  # it may be what has filled the disk
     return Store(folder)
 
 

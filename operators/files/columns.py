@@ -6,12 +6,11 @@ from typing import NamedTuple
 import bpy
 import numpy as np
 
-from ...core.files import Digits, join_digits
+from ...core.files import LARGEST_SINGLE, Digits, join_digits
 from ..objects.attributes import point_count, read_attribute
 from ..objects.place import COLUMNS
 
 RENAMED = "file_"  # prefix of columns whose names Blender reserves
-_LARGEST = float(np.finfo(np.float32).max)
 
 
 class Column(NamedTuple):
@@ -82,7 +81,7 @@ def _too_large(values):
     """Count the numbers beyond single precision."""
     if values.dtype != np.float64:
         return 0
-    return np.count_nonzero(np.isfinite(values) & (np.abs(values) > _LARGEST))
+    return np.count_nonzero(np.isfinite(values) & (np.abs(values) > LARGEST_SINGLE))
 
 
 def _description(name, digits, second):

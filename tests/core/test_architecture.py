@@ -228,11 +228,9 @@ def test_public_packages_name_what_they_export_as_type_checkers_ask_for_it(packa
 
 
 def test_core_needs_numpy_and_scipy_only():
-    """But for the readers of LAS files; that they import them when they read, is among the tests of these."""
+    """But for files of LAS; that it imports theirs when it reads, is among the tests of these."""
     allowed = set(sys.stdlib_module_names) | {"numpy", "scipy"}
-    las = {
-        (f"{stem}.py", name) for stem in ("las", "las_packing", "las_writing", "copc") for name in ("laspy", "lazrs")
-    }
+    las = {("las_packages.py", name) for name in ("laspy", "lazrs")}
     wrong = [
         f"{file.name}: {name}"
         for file in sorted((ROOT / "core").rglob("*.py"))

@@ -156,7 +156,7 @@ def test_laspy_is_missing(tmp_path, monkeypatch):
 
     write_las(tmp_path / "a.las")
     monkeypatch.setattr(builtins, "__import__", fail)
-    with pytest.raises(PointCloudError, match="lazrs is missing. Install laspy and lazrs, or export the points as PLY"):
+    with pytest.raises(PointCloudError, match="lazrs is missing. Install both, or take another format, such as PLY"):
         read_points(tmp_path / "a.las")
 
 

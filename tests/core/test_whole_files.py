@@ -169,7 +169,7 @@ class TestHolding:
 
 def test_a_cut_that_another_process_is_at_is_told(tmp_path):
     points = core.example_sphere()
-    with holding(tmp_path / ".store.lock"), pytest.raises(core.PointCloudError, match="at work on"):
+    with holding(tmp_path / ".store.lock"), pytest.raises(core.PointCloudError, match="at work in"):
         core.tiles.cut_to_store(lambda: [(points, {})], tmp_path / "store", 400)
     core.tiles.cut_to_store(lambda: [(points, {})], tmp_path / "store", 400)
     assert [known.name for known in tmp_path.iterdir()] == ["store"]
