@@ -12,9 +12,9 @@ from ..errors import TooFewPointsError
 from ..types import Array, Bools, Floats
 from .copc import Box, Octree, read_octree, records_of
 from .las_choices import LasChoices
-from .las_form import SYSTEM, LasForm, read_form
+from .las_form import OFFSET, SYSTEM, LasForm, is_lost, read_form
 from .las_packages import import_las
-from .las_packing import PackedChunk, check_header, check_size, records_after
+from .las_packing import PackedChunk, Record, check_header, check_size, read_records
 from .reference import Reference, read_reference
 from .rows import too_short
 from .table import CHANNELS, NORMAL, NORMALS, PointTable, color_by, full_color, normal_names, take_normals
@@ -56,6 +56,7 @@ class LasFile(NamedTuple):
         Of compressed points.
     reference : Reference
         What it states of its coordinates.
+    records : list of Record
     """
 
     path: Path
@@ -63,6 +64,7 @@ class LasFile(NamedTuple):
     reader: Any
     chunks: list[PackedChunk]
     reference: Reference
+    records: list[Record]
 
     @property
     def octree(self) -> Octree | None:
@@ -107,16 +109,27 @@ class LasFile(NamedTuple):
         extras = self._extras
         normals = dict(zip(normal_names(extras), NORMALS, strict=False))  # as `to_columns` names them
         named = {normals.get(name, name): item for name, item in extras.items()}
-        return read_form(self.reader.header, named).scaled(self.scale(las))
+        return read_form(self.reader.header, self.records, named).scaled(self.scale(las))
 
-    def left_out(self) -> list[str]:
-        """Report the columns that are not read."""
+    def notices(self) -> list[str]:
+        """Report the columns and records that are not read, and times that LAS 1.4 would count from another begin."""
         layout, name = self.reader.header.point_format, self.path.name
         extra = [item for item in layout.extra_dimensions if item.num_elements not in _NUMBERS]
         notices = [f"{name}: left out {item.name}, which has {item.num_elements} numbers per point." for item in extra]
         if _WAVEFORMS in layout.standard_dimension_names:
             notices.append(
                 f"{name}: left out the waveforms of its points, {_WAVEFORMS} to z_t. Use the file itself for these."
+            )
+        lost = [f"{record.user} {record.number}" for record in self.records if is_lost(record)]
+        if lost:
+            notices.append(
+                f"{name}: left out records of its header, {', '.join(lost)}, which are long, or of these points alone."
+            )
+        header = self.reader.header
+        if header.global_encoding.value & OFFSET:
+            notices.append(
+                f"{name}: its GPS times begin {header.gps_time_offset} million seconds after the begin of GPS time, as"
+                " LAS 1.5 may tell, not 1000. LAS files keep that; elsewhere do not compare them."
             )
         return notices
 
@@ -145,9 +158,11 @@ def opened_las(path: Path) -> Iterator[LasFile]:
             # Not in parallel: that takes memory for as many points as a file names in a chunk.
             with laspy.open(file, closefd=False, read_evlrs=False, laz_backend=laspy.LazBackend.Lazrs) as reader:
                 chunks = check_size(file, reader.header, path)
-                for record in records_after(file, reader.header, SYSTEM):
-                    reader.header.vlrs.append(laspy.vlrs.known.vlr_factory(laspy.VLR(*record)))
-                yield LasFile(path, file, reader, chunks, read_reference(reader.header))
+                records = read_records(file, reader.header)
+                for user, number, text, data, after in records:
+                    if after and user == SYSTEM and data is not None:
+                        reader.header.vlrs.append(laspy.vlrs.known.vlr_factory(laspy.VLR(user, number, text, data)))
+                yield LasFile(path, file, reader, chunks, read_reference(reader.header), records)
         except (laspy.errors.LaspyException, lazrs.LazrsError) as error:
             raise ValueError(f"{error}") from error  # `read_points` reports it as numpy's
 
@@ -164,7 +179,7 @@ def read_las(path: Path, las: LasChoices = LasChoices()) -> PointTable:
     """
     with opened_las(path) as file:
         count, tally, done = file.reader.header.point_count, Tally(las), 0
-        table = PointTable(np.empty((count, 3)), notices=file.left_out(), las=file.form(las))
+        table = PointTable(np.empty((count, 3)), notices=file.notices(), las=file.form(las))
         for points, columns in las_pieces(file, tally, _BLOCK):
             rows = slice(done, done + len(points))
             table.points[rows] = points

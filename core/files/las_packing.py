@@ -2,7 +2,6 @@
 
 import os
 import struct
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
@@ -11,14 +10,37 @@ from .las_packages import import_las
 from .rows import unpacks_too_far
 
 _SHORTEST = 227  # bytes of a header
-_DETAIL = 54  # bytes of a variable length record at least
-_AFTER = struct.Struct("<2x16sHQ32s")  # of a record after the points: whose, its number, bytes, what it is
-_MOST = 65535  # bytes of a record before them
+_LENGTHS, _LENGTHS_AT = struct.Struct("<HII"), 94  # of the header, of all before the points, and how many records
+_BEFORE, _AFTER = struct.Struct("<2x16sHH32s"), struct.Struct("<2x16sHQ32s")  # what a record begins with
+_MOST = 65535  # bytes of a record before the points
 _CHUNKED, _LAYERED = 2, 3  # kinds of compression
 # Items of a compressed point by number: bytes, and layers if there are any. Others are extra bytes, a layer for each.
 _ITEMS = {6: (20, 0), 7: (8, 0), 8: (6, 0), 9: (29, 0), 10: (30, 9), 11: (6, 1), 12: (8, 2), 13: (29, 1)}
 _EXTRA = (0, 14)
 _LATEST = 3  # version of these that lazrs reads
+
+
+class Record(NamedTuple):
+    """A record of a file.
+
+    Attributes
+    ----------
+    user : str
+        Whose it is.
+    number : int
+    text : str
+        What it is.
+    data : bytes or None
+        None where it is longer than one before the points may be, or than the file.
+    after : bool
+        Whether it lies after the points.
+    """
+
+    user: str
+    number: int
+    text: str
+    data: bytes | None
+    after: bool
 
 
 class PackedChunk(NamedTuple):
@@ -35,8 +57,8 @@ def check_header(file: BinaryIO, path: Path) -> None:
     data = file.read(_SHORTEST)
     if len(data) < _SHORTEST or data[:4] != b"LASF":
         raise InvalidPointsError(f"{path} is no LAS file: it does not begin with the header of one. Export it again.")
-    length, begin, details = struct.unpack_from("<HII", data, 94)
-    if length + details * _DETAIL > begin or begin > size:
+    length, begin, details = _LENGTHS.unpack_from(data, _LENGTHS_AT)
+    if length + details * _BEFORE.size > begin or begin > size:
         raise InvalidPointsError(
             f"{path} is shorter than its header states: {details} records before byte {begin:,} of {size:,}. Copy it"
             " again."
@@ -44,21 +66,28 @@ def check_header(file: BinaryIO, path: Path) -> None:
     file.seek(0)
 
 
-def records_after(file: BinaryIO, header: Any, user: str) -> Iterator[tuple[str, int, str, bytes]]:
-    """Yield the records of a user that lie after the points, as `laspy.VLR` takes them.
-
-    Those that are longer than records before the points may be, or than the file, are left out: laspy would read all.
-    """
-    back, size, place = file.tell(), os.fstat(file.fileno()).st_size, header.start_of_first_evlr
-    for _ in range(header.number_of_evlrs):
-        if not 0 < place <= size - _AFTER.size:
-            break
-        file.seek(place)
-        name, number, length, text = _AFTER.unpack(file.read(_AFTER.size))
-        if name.rstrip(b"\0") == user.encode() and length <= min(_MOST, size - place - _AFTER.size):
-            yield user, number, text.rstrip(b"\0").decode("ascii", "replace"), file.read(length)
-        place += _AFTER.size + length
+def read_records(file: BinaryIO, header: Any) -> list[Record]:
+    """Return all records: laspy would read those after the points whole, however long they are, and change some."""
+    back, size, result = file.tell(), os.fstat(file.fileno()).st_size, list[Record]()
+    file.seek(_LENGTHS_AT)
+    begin, _, before = _LENGTHS.unpack(file.read(_LENGTHS.size))
+    after = header.start_of_first_evlr, header.number_of_evlrs
+    for head, (place, count) in ((_BEFORE, (begin, before)), (_AFTER, after)):
+        for _ in range(count):
+            if not 0 < place <= size - head.size:
+                break
+            file.seek(place)
+            user, number, length, text = head.unpack(file.read(head.size))
+            place += head.size
+            data = file.read(length) if length <= min(_MOST, size - place) else None
+            result.append(Record(_text(user), number, _text(text), data, head is _AFTER))
+            place += length
     file.seek(back)
+    return result
+
+
+def _text(data: bytes) -> str:
+    return data.partition(b"\0")[0].decode("latin-1")
 
 
 def check_size(file: BinaryIO, header: Any, path: Path) -> list[PackedChunk]:
@@ -90,16 +119,20 @@ def _check_packing(file: BinaryIO, begin: int, size: int, header: Any, path: Pat
     _, lazrs = import_las()
     found = [detail.record_data for detail in header.vlrs.get("LasZipVlr")]
     kind, items = (0, []) if not found else _read_items(found[0])
+    known = all(number in _ITEMS or number in _EXTRA for number, _, _ in items)
+    latest = max((version for _, _, version in items), default=0)
     wanted = [size for number, size, _ in items if number in _ITEMS and _ITEMS[number][0] != size]
     if (
         kind not in (_CHUNKED, _LAYERED)
         or wanted
         or sum(size for _, size, _ in items) != header.point_format.size
-        or any((number not in _ITEMS and number not in _EXTRA) or version > _LATEST for number, _, version in items)
+        or not known
+        or latest > _LATEST
     ):
+        newer = f"by LASzip: it is of version {latest} of that, and lazrs reads {_LATEST} at most"
+        cause = newer if known and latest == _LATEST + 1 else "copy it again: it may be corrupted"
         raise InvalidPointsError(
-            f"{path} uses an unknown compression. Save it again as LAS by the program that it is from; or it is"
-            " corrupted: copy it again."
+            f"{path} uses an unknown compression. Save it again as LAS by the program that it is from, or {cause}."
         )
     fault = InvalidPointsError(f"{path} is broken: its compressed points do not match its header. Copy it again.")
 

@@ -48,9 +48,9 @@ def write_las(path: Path, pieces: ColumnPieces, name: str, form: LasForm | None 
     name : str
         Of the file, for texts.
     form : LasForm, optional
-        Of the file that the points were read from: point format, version, coordinate system, kind of times, types of
-        extra bytes; and steps, on those axes on which all points still are on them. If not given, the version is 1.4,
-        and all returns are single ones unless columns tell them.
+        Of the file that the points were read from: point format, version, what else its header states, types of extra
+        bytes; and steps, on those axes on which all points still are on them. If not given, the version is 1.4, and all
+        returns are single ones unless columns tell them.
 
     Returns
     -------
@@ -66,12 +66,14 @@ def write_las(path: Path, pieces: ColumnPieces, name: str, form: LasForm | None 
     ranges, on_steps = _looked_at(pieces, form)
     low, high = np.array([[ranges[axis].low, ranges[axis].high] for axis in AXES], dtype=np.float64).T
     kind = _point_format({number: laspy.PointFormat(number) for number in (*_LEGACY, *_EXTENDED)}, ranges, form)
-    version = "1.4" if form is None or kind not in _LEGACY else min(max(form.version, "1.2"), "1.4")
+    first, last = ("1.2", "1.4") if kind in _LEGACY else ("1.4", "1.5")
+    version = "1.4" if form is None else min(max(form.version, first), last)
     header = laspy.LasHeader(point_format=kind, version=version)
     header.offsets, header.scales = np.floor(low), np.full(3, _step(low, high))
     places, extras, notices = _places(header.point_format, ranges, form, name)
-    header.global_encoding.value = _encoding(kind, ranges) if form is None else form.encoding
+    header.global_encoding.value = _encoding(kind, ranges)
     if form is not None:
+        form.put(header)
         steps = np.where(on_steps, form.scales, header.scales)
         if (steps > form.scales).any():
             notices.append(
@@ -79,7 +81,6 @@ def write_las(path: Path, pieces: ColumnPieces, name: str, form: LasForm | None 
                 " they are from: they reach too far."
             )
         header.offsets, header.scales = np.where(on_steps, form.offsets, header.offsets), steps
-        header.vlrs.extend(laspy.VLR(*record) for record in form.system())
     header.add_extra_dims([laspy.ExtraBytesParams(**given) for given in extras])
     for record in header.vlrs.get("ExtraBytesVlr"):
         for item in record.extra_bytes_structs:  # laspy would state ranges, of the first point of each piece alone
@@ -91,7 +92,7 @@ def write_las(path: Path, pieces: ColumnPieces, name: str, form: LasForm | None 
         notices.append(
             f"{name}: no column tells how many returns a pulse had. They are written as those up to each point."
         )
-    with laspy.open(str(path), mode="w", header=header) as file:
+    with laspy.open(str(path), mode="w", header=header, encoding_errors="ignore") as file:  # texts as they were
         for columns in pieces():
             points = laspy.ScaleAwarePointRecord.zeros(len(columns[AXES[0]]), header=header)
             for axis in AXES:

@@ -115,7 +115,7 @@ class Chunks:
 
     def _read_las(self) -> Iterator[tuple[Floats, dict[str, Array]]]:
         with opened_las(self._path) as file:
-            self.notices += file.left_out()
+            self.notices += file.notices()
             self.las = file.form(self._las)
             tally, near = Tally(self._las), True
             for points, attributes in las_pieces(file, tally, self._size, self._box, self._level):

@@ -1,6 +1,8 @@
 """LAS files of all point formats for tests, with a number of its own in each column."""
 
 import struct
+from datetime import date
+from uuid import UUID
 
 import laspy
 import numpy as np
@@ -9,18 +11,35 @@ WKT = 'PROJCS["ETRS89 / UTM zone 32N",GEOGCS["ETRS89"],UNIT["metre",1],AUTHORITY
 KEYS = struct.pack("<12H", 1, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, 25832)
 WAVEFORMS = {4: 1, 5: 3, 9: 6, 10: 8}  # point formats, and those without
 PLACE = np.array([445_000.0, 5_550_000.0, 210.0])
+RECORDS = (  # beside the coordinate system
+    ("LASF_Spec", 0, b"names of classes", bytes([2]) + b"Ground".ljust(15)),
+    ("LASF_Spec", 3, b"", b"a survey"),
+    ("someone", 7, "Höhe".encode("latin-1"), bytes(range(256))),
+)
+STATED = {
+    "file_source_id": 17,
+    "system_identifier": "Gerät 1".encode("latin-1"),
+    "creation_date": date(2020, 2, 29),
+    "uuid": UUID(int=12345),
+}
 
 
-def write_all(path, kind, side=14, full=65535, withheld=False, wkt=WKT, scale=0.001, time=1):
+def write_all(path, kind, side=14, full=65535, withheld=False, wkt=WKT, scale=0.001, time=1, begin=None):
     """Write a wavy ground of a point format with all columns and extra bytes, and return what laspy reads of it."""
     rng = np.random.default_rng(kind)
     x, y = (0.25 * (axis.ravel() + rng.uniform(-0.2, 0.2, side**2)) for axis in np.mgrid[:side, :side])
-    header = laspy.LasHeader(point_format=kind, version="1.4" if kind > 5 else "1.3" if kind > 3 else "1.2")
+    version = ("1.4" if kind > 5 else "1.3" if kind > 3 else "1.2") if begin is None else "1.5"
+    header = laspy.LasHeader(point_format=kind, version=version)
     header.scales, header.offsets = np.array([scale, scale, 0.5 * scale]), PLACE + 0.0005
     header.global_encoding.gps_time_type = laspy.header.GpsTimeType(time)
     header.global_encoding.wkt = kind > 5
     number, data = (2112, wkt.encode() + b"\0") if kind > 5 else (34735, KEYS)
     header.vlrs.extend([laspy.VLR("LASF_Projection", number, "a system", data)] if wkt else [])
+    header.vlrs.extend(laspy.VLR(*record) for record in RECORDS)
+    for name, value in STATED.items():
+        setattr(header, name, value)
+    if begin is not None:
+        header.global_encoding.gps_time_offset, header.gps_time_offset = True, begin
     header.add_extra_dims(
         [
             laspy.ExtraBytesParams("Deviation", "u2", "shape of the echo"),
@@ -55,8 +74,16 @@ def write_all(path, kind, side=14, full=65535, withheld=False, wkt=WKT, scale=0.
     las.beam = rng.normal(size=(side**2, 3)).astype(np.float32)  # as many digits as Blender keeps
     las["odd\nname"] = rng.integers(-5, 5, side**2)
     las.NormalZ = np.ones(side**2)
-    las.write(str(path))
+    save(las, path)
     return laspy.read(path)
+
+
+def save(las, path):
+    """Write a file whose texts need not be ASCII, as laspy's own method wants them."""
+    with laspy.open(str(path), "w", header=las.header, encoding_errors="ignore") as file:
+        file.write_points(las.points)
+        if las.evlrs:
+            file.write_evlrs(las.evlrs)
 
 
 def check_same(found, given, extra=()):
@@ -90,3 +117,13 @@ def check_same(found, given, extra=()):
     for number in ("WktCoordinateSystemVlr", "GeoKeyDirectoryVlr"):
         pair = [[record.record_data_bytes() for record in las.header.vlrs.get(number)] for las in (found, given)]
         assert pair[0] == pair[1]
+    assert {name: getattr(found.header, name) for name in STATED} == STATED
+    assert found.header.gps_time_offset == given.header.gps_time_offset
+    assert records(found) == records(given) != []
+
+
+def records(las):
+    """Return the records of a file that are neither of its coordinate system nor of how points are stored."""
+    others = [record for record in las.header.vlrs if record.user_id not in ("LASF_Projection", "laszip encoded")]
+    found = [(record.user_id, record.record_id, record.description, record.record_data_bytes()) for record in others]
+    return [record for record in found if record[:2] != ("LASF_Spec", 4)]

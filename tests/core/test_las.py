@@ -190,7 +190,12 @@ BROKEN = {  # what is written where in a LAZ file of format 7, and what the erro
     "kind": (items_of, "<H", 1, "uses an unknown compression"),
     "item": (lambda path: items_of(path) + 36, "<H", 65535, "uses an unknown compression"),
     "item kind": (lambda path: items_of(path) + 34, "<H", 99, "uses an unknown compression"),
-    "item version": (lambda path: items_of(path) + 38, "<H", 4, "uses an unknown compression. Save it again as LAS"),
+    "item version": (
+        lambda path: items_of(path) + 38,
+        "<H",
+        4,
+        "uses an unknown compression. Save it again as LAS .* by LASzip: it is of version 4",
+    ),
     "items": (lambda path: items_of(path) + 32, "<H", 65535, "is broken"),
 }
 

@@ -1,11 +1,13 @@
 """All columns of LAS and LAZ, and what their headers state, survive whatever the program does with the points."""
 
+import json
+
 import laspy
 import numpy as np
 import pytest
 
-from core.files import LasChoices, read_points, write_points
-from tests.core.las_files import WAVEFORMS, WKT, check_same, write_all
+from core.files import LasChoices, LasForm, read_points, write_points
+from tests.core.las_files import RECORDS, STATED, WAVEFORMS, WKT, check_same, records, save, write_all
 
 NORMALS = ("NormalX", "NormalY", "NormalZ")  # which an analysis replaces
 
@@ -109,6 +111,70 @@ def test_numbers_that_extra_bytes_do_not_hold_get_another_type(tmp_path):
     assert (found["Amplitude"] == 1e4).all()
 
 
+class TestRecords:
+    def test_of_some_files_are_those_of_all(self, run, tmp_path):
+        write_all(tmp_path / "a.las", 6)
+        given = write_all(tmp_path / "b.las", 6)
+        given.header.file_source_id = 18
+        given.header.vlrs.pop(given.header.vlrs.index("VLR"))  # the first one that laspy has no class of its own for
+        given.header.vlrs.append(laspy.VLR("someone", 8, "", b"x"))
+        given.header.system_identifier = "other"
+        save(given, tmp_path / "b.las")
+        sources, out = (tmp_path / "a.las", tmp_path / "b.las"), tmp_path / "out"
+        _, [line] = run("tiles", "run", *sources, "--out-dir", out, "--tile-points", 500, "--format", "laz")
+        assert (
+            "Left out records of headers that are not the same in all files: LASF_Spec 3, someone 8." in line["notices"]
+        )
+        found = laspy.read(out / "tile_000000.laz")
+        assert [(user, number) for user, number, *_ in records(found)] == [("LASF_Spec", 0), ("someone", 7)]
+        assert (found.header.file_source_id, found.header.system_identifier) == (0, "OTHER")
+        assert found.header.creation_date == STATED["creation_date"]
+
+    def test_of_the_points_alone_are_told(self, tmp_path):
+        """Where points are in the file, a histogram, and what is longer than a record before the points may be."""
+        given = write_all(tmp_path / "a.las", 6)
+        given.header.vlrs.append(laspy.VLR("LAStools", 30, "", bytes(9)))
+        given.header.vlrs.append(laspy.VLR("LASF_Spec", 2, "", bytes(9)))
+        given.evlrs = laspy.vlrs.vlrlist.VLRList([laspy.VLR("someone", 9, "", bytes(70_000))])
+        given.evlrs.append(laspy.VLR("someone", 10, "after", b"points"))
+        save(given, tmp_path / "a.las")
+        table = read_points(tmp_path / "a.las")
+        [notice] = table.notices
+        assert "left out records of its header, LAStools 30, LASF_Spec 2, someone 9," in notice
+        assert write_points(tmp_path / "b.laz", table) == []
+        found = records(laspy.read(tmp_path / "b.laz"))
+        assert [record[:2] for record in found] == [*(record[:2] for record in RECORDS), ("someone", 10)]
+        assert found[-1][2:] == ("after", b"points")
+
+    def test_are_what_a_second_file_has_of_the_first(self, tmp_path):
+        """Through JSON, as Blender and the folders of tiles keep them."""
+        given = write_all(tmp_path / "a.las", 7)
+        table = read_points(tmp_path / "a.las")
+        table.las = LasForm(**json.loads(json.dumps(table.las.to_json())))
+        write_points(tmp_path / "b.laz", table)
+        check_same(laspy.read(tmp_path / "b.laz"), given)
+
+
+class TestTimesThatBeginElsewhere:
+    """LAS 1.5, whose times count from a number of millions of seconds."""
+
+    def test_are_kept_and_told(self, run, tmp_path):
+        given = write_all(tmp_path / "a.las", 7, begin=1400)
+        assert (str(given.header.version), given.header.gps_time_offset) == ("1.5", 1400)
+        code, [line] = run("convert", tmp_path / "a.las", "--out", tmp_path / "b.laz")
+        [notice] = line["notices"]
+        assert (code, "GPS times begin 1400 million seconds after the begin of GPS time" in notice) == (0, True)
+        check_same(laspy.read(tmp_path / "b.laz"), given)
+
+    def test_of_some_files_are_told(self, run, tmp_path):
+        write_all(tmp_path / "a.las", 7, begin=1400)
+        write_all(tmp_path / "b.las", 7)
+        sources, out = (tmp_path / "a.las", tmp_path / "b.las"), tmp_path / "out"
+        _, [line] = run("tiles", "run", *sources, "--out-dir", out, "--tile-points", 500, "--format", "laz")
+        assert any("The GPS times of some files count from another begin" in notice for notice in line["notices"])
+        assert not laspy.read(out / "tile_000000.laz").header.global_encoding.gps_time_offset
+
+
 class TestSystem:
     def test_does_not_hold_for_other_units(self, tmp_path):
         feet = 'PROJCS["a",GEOGCS["b"],UNIT["foot",0.3048]]'
@@ -126,7 +192,7 @@ class TestSystem:
         record = given.header.vlrs.extract("WktCoordinateSystemVlr")[0]
         given.evlrs = laspy.vlrs.vlrlist.VLRList([laspy.VLR("someone", 1, "", bytes(70_000)), record])
         for name in ("b.las", "b.laz"):
-            given.write(str(tmp_path / name))
+            save(given, tmp_path / name)
             table = read_points(tmp_path / name)
             write_points(tmp_path / "c.laz", table)
             [found] = laspy.read(tmp_path / "c.laz").header.vlrs.get("WktCoordinateSystemVlr")
@@ -151,7 +217,7 @@ class TestSystem:
         assert code == 0
         told = " ".join(line["notices"])
         assert "The files state different coordinate systems" in told
-        assert "The GPS times of some files count from the begin of a week" in told
+        assert "The GPS times of some files count from another begin" in told
         found = laspy.read(out / "tile_000000.laz")
         assert not found.header.vlrs.get("WktCoordinateSystemVlr")
         assert (found.point_format.id, found.header.scales[0]) == (7, 0.0001)
