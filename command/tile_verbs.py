@@ -326,16 +326,17 @@ class _Stage(_TileVerb):
         return core.tiles.Store(path / STORE)
 
     def visit(self, store, waiting, arguments):
-        """Take a step at a share of the tiles that wait for it; none where nothing waits."""
+        """Take a step at a share of the tiles that wait for it; none where nothing waits. Return which failed, too."""
         if waiting is None:
-            return {"step": None, "visited": 0, "waiting": 0}
+            return {"step": None, "visited": 0, "waiting": 0, "errors": []}
         (step, numbers), (number, count) = waiting, arguments.tiles
         mine = [tile for tile in numbers if tile % count == number - 1]
         with ToldStages(self.name, _EACH) as stages:
             for done, tile in enumerate(mine):
                 stages(step.stage, done / len(mine))
                 core.tiles.visit_tile(store.folder, step.name, tile)
-        return {"step": step.name, "visited": len(mine), "waiting": len(numbers) - len(mine)}
+        errors = [tile_work.failure(store, tile) for tile in mine if store.error(tile) is not None]
+        return {"step": step.name, "visited": len(mine), "waiting": len(numbers) - len(mine), "errors": errors}
 
 
 class TilesSurvey(_Stage):
@@ -486,8 +487,7 @@ def _report(store, folder, arguments):
     lines = [{"path": record["file"], **shared, **record} for record in [*files, *records]]
     write_text(folder / _REPORT, "".join(f"{json.dumps(line)}\n" for line in lines))
     errors = [{"file": record["file"], "error": record["error"]} for record in files]
-    kinds = ("tile", "error", "scarce")
-    errors += [{name: record[name] for name in kinds} for record in records if "error" in record]
+    errors += [tile_work.failure(store, record["tile"]) for record in records if "error" in record]
     modes = {"eigenvalues": tile_work.eigenvalues(store)} if store.agreed_after("spectrum") else {}
     return {**tile_work.totals(store, records), **modes, "failed_files": len(files), "errors": errors}
 

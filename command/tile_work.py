@@ -372,9 +372,8 @@ def tile_records(store, folder, suffix):
             "points": len(store.own(number)),
             "elapsed": round(seconds_of(store, number), 3),
         }
-        error = store.error(number)
-        if error is not None:
-            records.append({**record, "error": error, "scarce": store.is_scarce(number)})
+        if store.error(number) is not None:
+            records.append({**record, **failure(store, number)})
         elif store.done("measure", number):
             area = float(store.read("measure", number, "areas").sum())
             notices = store.read("measure", number, "notices").tolist()
@@ -382,6 +381,11 @@ def tile_records(store, folder, suffix):
         else:
             records.append({**record, "waiting": True})
     return records
+
+
+def failure(store, number):
+    """Return what is told of a tile that failed."""
+    return {"tile": number, "error": store.error(number), "scarce": store.is_scarce(number)}
 
 
 def file_records(store):

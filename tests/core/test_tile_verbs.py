@@ -384,6 +384,35 @@ def test_a_broken_tile_is_told_and_the_others_written(run, scans, tmp_path):
     assert run("report", out)[1][0]["failed"] == 1
 
 
+@pytest.mark.parametrize(
+    ("failing", "error", "code"), [("extent", core.ComponentError, 1), ("measure", core.NotEnoughMemoryError, 3)]
+)
+def test_a_stage_in_which_a_tile_fails_tells_it_and_the_others_go_on(
+    run, scans, tmp_path, monkeypatch, failing, error, code
+):
+    real, out = core.tiles.visit_tile, tmp_path / "out"
+
+    def visit(folder, step, number):
+        if (step, number) != (failing, 1):
+            return real(folder, step, number)
+        core.tiles.Store(folder).fail(step, number, error("It failed."))
+        return number
+
+    monkeypatch.setattr(core.tiles, "visit_tile", visit)
+    run("tiles", "cut", scans, "--out-dir", out, *OPTIONS)
+    codes = {}
+    while "measure" not in codes:
+        for verb in ("survey", "measure"):
+            found, [line] = run("tiles", verb, out)
+            if line.get("step"):
+                codes[line["step"]] = found
+                failed = [{"tile": 1, "error": "It failed.", "scarce": code == 3}]
+                assert line["errors"] == (failed if line["step"] == failing else [])
+        assert run("tiles", "agree", out)[0] == 0
+    assert {step: found for step, found in codes.items() if found} == {failing: code}
+    assert run("tiles", "report", out)[0] == code
+
+
 def write_delivery(folder, rod):
     """Write files of a survey: a rod in two halves, and others far away that are as files should not be."""
     folder.mkdir()
