@@ -1,4 +1,4 @@
-"""Kinds of columns without names, by their values: colors, normals, or unknown."""
+"""Kinds of columns without names, by their values: colors, normals, corners of triangles, or unknown."""
 
 import numpy as np
 
@@ -10,8 +10,25 @@ _NORMALS = ("nx", "ny", "nz")
 _FULL = 255.0
 _SAMPLE = 10_000  # rows that are examined first
 _MOST = 30  # columns that are examined
+_PER_CORNER = 2.5  # triangles of a mesh have half as many corners, but for handles
 _LENGTH = 0.02  # by which lengths of normals, rounded to a few digits, may differ from 1
 _STEP = 1e-4  # by which shares of 255 may differ from whole ones, in a file of a few digits
+
+
+def are_triangles(rows: Floats) -> bool:
+    """Whether numbers, (n, 3), are indices of the corners of triangles: most edges, pairs of numbers, are of two rows.
+
+    Of points of whole numbers they are of one row or of many; or of two where these are a shell of voxels, which has
+    fewer numbers: triangles are twice as many as their corners, or fewer.
+    """
+    if not (rows.min(initial=0.0) >= 0.0 and rows.max(initial=0.0) < 2.0**31 and (rows == np.rint(rows)).all()):
+        return False
+    corners = np.sort(rows.astype(np.int64), axis=1)
+    if len(rows) > _PER_CORNER * len(np.unique(corners)) or (corners[:, :2] == corners[:, 1:]).any():
+        return False
+    edges = np.concatenate([(corners[:, a] << 32) + corners[:, b] for a, b in ((0, 1), (1, 2), (0, 2))])
+    _, shared = np.unique(edges, return_counts=True)
+    return 2 * int(np.count_nonzero(shared == 2)) > len(shared)
 
 
 class Guess:

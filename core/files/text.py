@@ -15,7 +15,7 @@ from ..types import Array
 from .cells import Blocks, Rows, find_rows
 from .digits import shortest
 from .grid import find_grid, grid_pieces
-from .guess import Guess
+from .guess import Guess, are_triangles
 from .layout import Layout, find_layout, given_layout
 from .lines import is_number, read_text
 from .loading import Loaded, load
@@ -28,6 +28,7 @@ Pieces: TypeAlias = Iterator[tuple[PointTable, dict[str, Array]]]
 
 _BLOCK = 10_000  # lines that are written at once
 _SAMPLE = 100  # vertices by which their columns are decided
+_TRIANGLES = 100_000  # lines that may be triangles, which are looked at
 _MOST_DIGITS = 15  # of a number of points; no file has so many
 _SKIPPED = ("#", "//")  # prefixes of lines that may be of any length
 _SCAN_NAMES = {  # of the columns of PTS files
@@ -140,11 +141,19 @@ def _by_layout(rows: Rows, layout: Layout, size: int | None, notices: list[str])
     indices = _renamed(indices, standard_names(indices))
     if layout.announced not in (None, loaded.count):
         notices.append(f"{rows.path.name}: announces {layout.announced} points, but {loaded.count} lines follow.")
+    first = np.empty((0, 3))  # lines that may be triangles
     for places, others in loaded.pieces():
+        if rows.width == 3 and not any(layout.names) and len(first) < _TRIANGLES:
+            first = np.concatenate([first, places[: _TRIANGLES - len(first)]])
         named = {name: others[index] for name, index in indices.items()}
         table, channels = gather_columns(dict(zip("xyz", places.T, strict=True)) | named, rows.path)
         table.degrees = layout.degrees
         yield table, channels
+    if are_triangles(first):
+        notices.append(
+            f"{rows.path.name}: its numbers are whole, and most pairs of them are in two lines, as of triangles by the"
+            " indices of their corners. If they are, this is no point cloud: open the file with the points of these."
+        )
 
 
 def _renamed(columns: dict[str, int], names: dict[str, str]) -> dict[str, int]:

@@ -5,8 +5,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.spatial import ConvexHull, Delaunay
 from scipy.spatial.transform import Rotation
 
+import core
 from core import PointCloudError
 from core.files import chunks, join_pieces, read_points
 from tests.core import e57_files
@@ -332,6 +334,38 @@ def test_e57_of_whole_numbers_may_be_in_millimeters(tmp_path, kind):
         assert_allclose(table.points, places * factor, rtol=1e-6)
         assert any("If they are millimeters, scale the points by 0.001" in text for text in table.notices) == told
         assert len(table.notices) == told
+
+
+class TestTriangles:
+    """Lists of the corners of triangles, which are no points."""
+
+    def told(self, tmp_path, rows, header=""):
+        rows = np.random.default_rng(0).permutation(np.asarray(rows))
+        np.savetxt(tmp_path / "a.txt", rows, "%d", header=header, comments="")
+        pieces = chunks(tmp_path / "a.txt", 50)
+        read = [points for points, _ in pieces]
+        table = read_points(tmp_path / "a.txt")
+        assert list(pieces.notices) == table.notices
+        assert len(table.points) == sum(map(len, read)) == len(rows)
+        return ["indices of their corners" in notice for notice in table.notices] == [True]
+
+    @pytest.mark.parametrize("first", [0, 1])
+    def test_of_closed_and_open_meshes_are_told(self, tmp_path, first):
+        hull = ConvexHull(core.example_sphere()).simplices
+        flat = Delaunay(np.random.default_rng(1).random((60, 2))).simplices
+        for triangles in (hull, flat, [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]):
+            assert self.told(tmp_path, np.asarray(triangles) + first)
+        assert not self.told(tmp_path, hull, "x y z")
+
+    @pytest.mark.parametrize("low", [[0, 0, 0], [0, 40, 80], [7, 10, 30]])
+    def test_whole_points_are_not(self, tmp_path, low):
+        """Voxels of a volume, of planes, and of a shell, in two of which most pairs are; and millimeters of a scan."""
+        voxels = np.stack(np.meshgrid(*[np.arange(21)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+        radius = np.linalg.norm(voxels - 10.0, axis=1)
+        for kept in (slice(None), voxels[:, 2] == 3, voxels @ [1, 1, 1] == 20, abs(radius - 9.0) < 0.5):
+            assert not self.told(tmp_path, voxels[kept] + low)
+        scan = np.rint(1000.0 * (core.example_sphere() + 1.5)).astype(int)
+        assert not self.told(tmp_path, scan + low)
 
 
 def test_e57_of_a_few_meters_is_no_scan_in_millimeters(tmp_path):
