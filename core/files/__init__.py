@@ -15,6 +15,7 @@ from .formats import doubts as doubts
 from .formats import precision_notices as precision_notices
 from .formats import read_points as read_points
 from .formats import reading as reading
+from .formats import refuse_packed as refuse_packed
 from .formats import write_pieces as write_pieces
 from .formats import write_points as write_points
 from .frames import frame_number as frame_number

@@ -64,6 +64,16 @@ SPLATS = (".splat", ".spz")  # of Gaussian splats alone, which core.splats reads
 _PACKED = (".ksplat", ".sog", ".lcc")  # of such, which other programs convert
 
 
+def refuse_packed(path: FilePath) -> None:
+    """Refuse files of splats that other programs convert, by their names."""
+    path = as_path(path)
+    if path.suffix.lower() in _PACKED:
+        raise PointCloudError(
+            f"{path} holds Gaussian splats in a form that is not read. Convert it to .ply by SuperSplat, or by"
+            f" PlayCanvas's splat-transform ({brief(f'splat-transform {path.name} {path.stem}.ply')})."
+        )
+
+
 def read_points(path: FilePath, columns: str = "", las: LasChoices = LasChoices()) -> PointTable:
     """Read the points of a file of one of the kinds in `READABLE`.
 
@@ -91,11 +101,7 @@ def read_points(path: FilePath, columns: str = "", las: LasChoices = LasChoices(
     _check_there(path)
     if suffix in SPLATS:
         raise PointCloudError(f"{path} is a file of Gaussian splats. Read it as such, by read_splats.")
-    if suffix in _PACKED:
-        raise PointCloudError(
-            f"{path} holds Gaussian splats in a form that is not read. Convert it to .ply by SuperSplat, or by"
-            f" PlayCanvas's splat-transform ({brief(f'splat-transform {path.name} {path.stem}.ply')})."
-        )
+    refuse_packed(path)
     if suffix not in _READERS:
         known = ", ".join((*READABLE, *SPLATS))
         raise PointCloudError(f"{path} is not a file with points. Give one of {known}.")

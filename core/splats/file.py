@@ -20,6 +20,7 @@ from ..files import (
     read_vertex_columns,
     read_vertex_names,
     reading,
+    refuse_packed,
     replacing,
     write_vertex_columns,
 )
@@ -134,7 +135,8 @@ def _reader(path: Path) -> Callable[[Path], PlyVertices] | None:
 
 
 def _refuse(path: Path) -> NoReturn:
-    """Report the missing properties of a file."""
+    """Report the missing properties of a file, or what converts it."""
+    refuse_packed(path)
     names = read_vertex_names(path)
     missing = f"no {', '.join(name for name in NEEDED if name not in names)} among its properties"
     raise InvalidPointsError(
