@@ -12,7 +12,7 @@ from ..errors import TooFewPointsError
 from ..types import Array, Bools, Floats
 from .copc import Box, Octree, read_octree, records_of
 from .las_choices import LasChoices
-from .las_form import OFFSET, SYSTEM, LasForm, is_lost, read_form
+from .las_form import COMPATIBLE, OFFSET, SYSTEM, LasForm, is_lost, read_form
 from .las_packages import import_las
 from .las_packing import PackedChunk, Record, check_header, check_size, read_records
 from .reference import Reference, read_reference
@@ -124,6 +124,11 @@ class LasFile(NamedTuple):
         if lost:
             notices.append(
                 f"{name}: left out records of its header, {', '.join(lost)}, which are long, or of these points alone."
+            )
+        if COMPATIBLE in {record.user for record in self.records}:
+            notices.append(
+                f"{name}: was written for programs before LAS 1.4: classes above 31, numbers of returns above 7 and"
+                " fine scan angles are in the columns called LAS 1.4 and so on. LASzip can save it without that mode."
             )
         header = self.reader.header
         if header.global_encoding.value & OFFSET:

@@ -20,7 +20,8 @@ _OTHER_SYSTEM = "liblas"  # who states it once more
 _FORMAT, _NAMES = "LASF_Spec", (0, 3)  # who states other things, and the numbers of names of classes, and of text
 _PACKING = ("laszip encoded", "copc")  # who states how points are packed
 _DESCRIBED = (4, *range(100, 355), 65535)  # numbers of extra bytes and waveforms
-_INDEX = "LAStools"  # who states where points are in the file
+COMPATIBLE = "lascompatible"  # who states, and counts, points of LAS 1.4 that are written as of older versions
+_OF_POINTS = ("LAStools", COMPATIBLE)  # who states what holds for the points of a file alone, such as an index
 # Bits of the encoding: times do not begin anew each week; the system is in WKT; the header tells when times begin.
 TIME, WKT, OFFSET = 0b1, 0b10000, 0b1000000
 _KEPT = TIME | 0b1000 | WKT | OFFSET  # and that returns were made up; not those of waveforms
@@ -161,7 +162,7 @@ def _stated(header: Any) -> dict[str, Any]:
 
 def is_lost(record: Record) -> bool:
     """Whether a record is neither kept nor written anew: it is long, or holds for the points of the file alone."""
-    of_points = record.user == _INDEX or (record.user == _FORMAT and record.number not in _NAMES)
+    of_points = record.user in _OF_POINTS or (record.user == _FORMAT and record.number not in _NAMES)
     return not _is_anew(record) and (record.data is None or of_points or not record.user.isascii())
 
 

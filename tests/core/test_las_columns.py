@@ -155,6 +155,24 @@ class TestRecords:
         check_same(laspy.read(tmp_path / "b.laz"), given)
 
 
+def test_the_compatible_mode_of_laszip_is_told(tmp_path):
+    """Points of LAS 1.4 as of older versions, with what these lack in extra bytes, and a record that counts them."""
+    given = write_all(tmp_path / "a.las", 1)
+    given.add_extra_dim(laspy.ExtraBytesParams("LAS 1.4 classification", "u1"))
+    given["LAS 1.4 classification"] = np.full(len(given.points), 64)
+    given.header.vlrs.append(laspy.VLR("lascompatible", 22204, "", bytes(156)))
+    save(given, tmp_path / "a.las")
+    table = read_points(tmp_path / "a.las")
+    assert (table.attributes["LAS 1.4 classification"] == 64).all()
+    lost, told = table.notices
+    assert "lascompatible 22204" in lost
+    assert "classes above 31" in told
+    write_points(tmp_path / "b.las", table)
+    found = laspy.read(tmp_path / "b.las")
+    assert (found["LAS 1.4 classification"] == 64).all()
+    assert "lascompatible" not in {user for user, *_ in records(found)}
+
+
 class TestTimesThatBeginElsewhere:
     """LAS 1.5, whose times count from a number of millions of seconds."""
 
