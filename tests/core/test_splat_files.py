@@ -346,7 +346,7 @@ def test_what_reads_points_says_what_reads_splats(tmp_path, suffix):
 @pytest.mark.parametrize("suffix", [".ksplat", ".sog", ".SOG", ".lcc"])
 def test_splats_that_other_programs_convert(tmp_path, suffix):
     (tmp_path / f"a{suffix}").touch()
-    for read in (read_points, read_file, core.read_splats):
+    for read in (read_points, read_file, core.splats.read_splats):
         with pytest.raises(core.PointCloudError, match=rf"SuperSplat.*\(splat-transform a{suffix} a.ply\)\.$"):
             read(tmp_path / f"a{suffix}")
 
