@@ -2,8 +2,16 @@
 
 from importlib import import_module
 
-_home = __name__.rpartition(".")[0]
-tools = import_module(f"{_home}.tools".removeprefix("."))
-for _taken in ("groups", "laplacian", "listed", "quantities", "roughness", "settings", "tool"):  # as tools.groups
-    import_module(f"{tools.__name__}.{_taken}")
-core, quantities = tools.core, tools.quantities
+_HOME = f"{__name__.rpartition('.')[0]}.tools".removeprefix(".")
+_TAKEN = "groups", "laplacian", "listed", "quantities", "roughness", "settings", "tool"  # as tools.name
+
+
+def __getattr__(name):
+    """Import what stands beside this package as it is asked for, so that the program can begin before all of it."""
+    if name not in ("core", "quantities", "tools"):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    tools = import_module(_HOME)
+    for taken in _TAKEN:
+        import_module(f"{_HOME}.{taken}")
+    globals().update(core=tools.core, quantities=tools.quantities, tools=tools)
+    return globals()[name]

@@ -26,7 +26,8 @@ def test_it_holds_the_packages_in_the_tree_and_nothing_else(wheel):
         return {path.as_posix() for path in found if "__pycache__" not in path.parts}
 
     wanted = {f"{NAME}/{path}" for ending in ("*.py", "*.pyi", "py.typed") for path in sources("core", ending)}
-    wanted |= {f"{NAME}/command/{path}" for path in sources("command", "*.py")} | {f"{NAME}/__main__.py"}
+    above = [f"{folder}/{path}" for folder in ("command", "tools") for path in sources(folder, "*.py")]
+    wanted |= {f"{NAME}/{path}" for path in (*above, "__main__.py")}
     with zipfile.ZipFile(wheel) as packed:
         assert {name for name in packed.namelist() if ".dist-info/" not in name} == wanted
 
