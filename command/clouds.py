@@ -37,11 +37,15 @@ class Kind(NamedTuple):
         Of a path, the name of an object or "", the option for it, and the arguments of a command line; opens the file.
     own : callable
         Of a name, what another file holds, and arguments: makes that an object of an empty file, and returns it.
+    close : callable
+        Of the vertices and faces of a mesh: returns arrays of faces (m, k) without openings, and how many edges are
+        left of one face.
     """
 
     add_options: Any
     read: Any
     own: Any
+    close: Any
 
 
 def register(ending, kind):

@@ -1,5 +1,7 @@
 """The verb that makes a mesh of a cloud."""
 
+import argparse
+
 import numpy as np
 
 from . import clouds, colors, core
@@ -21,12 +23,21 @@ class Mesh(SurfaceVerb):
         """Endings of files."""
         return (*clouds.kinds(), *core.files.MESHES)
 
+    def add_options(self, parser):
+        super().add_options(parser)
+        if clouds.kinds():
+            told = "end the mesh where the points end; otherwise all openings are closed (default on)"
+            parser.add_argument("--keep-open", action=argparse.BooleanOptionalAction, default=True, help=told)
+
     def work(self, path, given, arguments, output, progress):
         cloud = clouds.Cloud(path, given, floaters(arguments))
         laplacian = self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress).laplacian
         mesh = core.surface.mesh_surface(laplacian, **chosen(self.settings, arguments), progress=progress)
         closed, opened = close_gaps(mesh.faces)
         faces, written = [mesh.faces, closed], []
+        for kind in clouds.kinds().values() if opened else ():
+            if not arguments.keep_open:
+                faces, opened = kind.close(mesh.vertices, faces)
         if output is not None:
             table = _on_vertices(cloud, laplacian, mesh.vertices)
             if clouds.kind_of(output) is not None:

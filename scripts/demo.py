@@ -18,8 +18,10 @@ POINTS = 20_000
 
 
 def load_scan(path, up):
-    """Open a scan as the command line does, and put it upright."""
-    obj, _ = studio.part("operators.files.opening").load(path)
+    """Open a scan, and put it upright."""
+    bpy.ops.wm.read_homefile(use_empty=True)
+    bpy.ops.meshfree.import_points(filepath=str(path))
+    obj = bpy.context.object
     if up == "Y":
         obj.rotation_mode = "XYZ"
         obj.rotation_euler.x += math.pi / 2.0

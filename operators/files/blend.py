@@ -38,9 +38,10 @@ from ..objects.reading import TYPES, Reading, checked_matrix, obstacle, reading_
 from ..objects.result import check_writable, note_stages, write_result
 from ..objects.splats import has_splats, write_splats
 from ..tools.analyze import Analysis
+from ..tools.mesh import close_holes
 from .arguments import as_setting
 from .columns import column_notices
-from .objects import add_column, add_object, faces_to, group_of, point_table
+from .objects import add_column, add_object, faces_of, faces_to, group_of, point_table
 from .splats import add_splats, placed_splats, with_results
 
 ENDING = ".blend"
@@ -304,7 +305,20 @@ def own(name, given, arguments):
     return _owned(obj, replace(given, notices=[*given.notices, *told]))
 
 
-KIND = Kind(add_options, read, own)
+def close(vertices, faces):
+    """Close the openings of a mesh, as `Kind` says."""
+    mesh = bpy.data.meshes.new("Surface")
+    try:
+        mesh.vertices.add(len(vertices))
+        mesh.vertices.foreach_set("co", vertices.astype(np.float32).reshape(-1))
+        faces_to(mesh, faces)
+        opened = close_holes(mesh, 0)
+        return faces_of(mesh), opened
+    finally:
+        bpy.data.meshes.remove(mesh)
+
+
+KIND = Kind(add_options, read, own, close)
 
 
 def _owned(obj, given):

@@ -211,3 +211,13 @@ def faces_to(mesh, faces):
     mesh.polygons.foreach_set("loop_start", (np.cumsum(sizes) - sizes).astype(np.int32))
     mesh.polygons.foreach_set("use_smooth", np.ones(len(sizes), dtype=bool))
     mesh.update(calc_edges=True)
+
+
+def faces_of(mesh) -> list:
+    """Return the faces of a mesh, arrays (m, k) int32, one for each number k of corners."""
+    corners = np.empty(len(mesh.loops), np.int32)
+    starts, counts = np.empty((2, len(mesh.polygons)), np.int32)
+    mesh.loops.foreach_get("vertex_index", corners)
+    mesh.polygons.foreach_get("loop_start", starts)
+    mesh.polygons.foreach_get("loop_total", counts)
+    return [corners[starts[counts == count, None] + np.arange(count)] for count in np.unique(counts).tolist()]

@@ -63,7 +63,7 @@ class MeshSurface(Tool):
             collection.objects.link(made)
         made.matrix_world = obj.matrix_world
         copy_place(made, obj)
-        opened = _close(made.data, GAP if self.keep_open else 0)
+        opened = close_holes(made.data, GAP if self.keep_open else 0)
         carried.write(made)
         for name in COLOR_CHOICES:
             setattr(made.meshfree, name, getattr(obj.meshfree, name))
@@ -195,7 +195,7 @@ def _mesh(name, vertices, faces):
     return mesh
 
 
-def _close(mesh, most):
+def close_holes(mesh, most):
     """Close the holes of a mesh with at most so many edges, 0 for all; return the number of open edges left."""
     shape = bmesh.new()
     shape.from_mesh(mesh)

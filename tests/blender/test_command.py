@@ -498,6 +498,18 @@ def test_blender_reads_meshes_that_are_written(run, tmp_path, suffix, importer):
     assert all(face.normal.dot(face.center) > 0.0 for face in mesh.polygons)
 
 
+def test_openings_are_kept_or_closed(run, tmp_path):
+    write(tmp_path / "a.csv", POINTS[POINTS[:, 2] > 0.0])
+    found = [run("mesh", tmp_path / "a.csv", *given)[1][0] for given in ((), ("--no-keep-open",))]
+    assert (found[0]["open_edges"] > 30, found[1]["open_edges"]) == (True, 0)
+    for ending in ("ply", "blend"):
+        code, [line] = run("mesh", tmp_path / "a.csv", "--no-keep-open", "--out", tmp_path / f"b.{ending}")
+        assert (code, line["faces"]) == (0, found[1]["faces"])
+    obj = opened(tmp_path / "b.blend")
+    assert len(obj.data.polygons) == line["faces"] > found[0]["faces"]
+    assert len(obj.data.vertices) - len(obj.data.edges) + len(obj.data.polygons) == 2
+
+
 def test_scans_are_written_as_they_were_read(run, tmp_path):
     """By the packages that the extension brings."""
     import laspy

@@ -1,7 +1,6 @@
 """The table of measures of parts: in the panel, in the clipboard, in files and on the command line."""
 
 import csv
-import json
 from types import SimpleNamespace
 
 import bpy
@@ -11,7 +10,6 @@ import pytest
 from tests.blender.clouds import add_object, local_points, sphere_points
 from tests.blender.conftest import part
 from tests.blender.operators import refused
-from tests.blender.test_command import run  # noqa: F401
 
 
 def two_spheres():
@@ -163,23 +161,6 @@ def test_the_table_in_a_file(obj, tmp_path):
     assert [row["name"] for row in rows] == ["Component 0", "Component 1"]
     assert float(rows[0]["area"]) == obj.meshfree.parts[0].area
     assert rows[0]["mean"] == ""
-
-
-@pytest.mark.parametrize("suffix", ["csv", "json"])
-def test_the_verb_writes_the_same_table(run, tmp_path, suffix):  # noqa: F811
-    points = two_spheres()
-    names, columns = "x,y,z,height", np.column_stack([points, points[:, 2]])
-    np.savetxt(tmp_path / "a.csv", columns, "%.15g", ",", header=names, comments="")
-    output = tmp_path / f"table.{suffix}"
-    code, [line] = run("measure", tmp_path / "a.csv", "--source", "height", "--out", output)
-    assert code == 0, line
-    assert [row["name"] for row in line["parts"]] == ["Component 0", "Component 1"]
-    first = line["parts"][0]
-    assert within(first["area"], first["area_uncertainty"], 16.0 * np.pi)
-    text = output.read_text(encoding="utf-8")
-    read = json.loads(text) if suffix == "json" else list(csv.DictReader(text.splitlines()))
-    assert [float(row["volume"]) for row in read] == [row["volume"] for row in line["parts"]]
-    assert [int(row["points"]) for row in read] == [900, 600]
 
 
 def test_the_panel_draws_the_table(obj):

@@ -182,19 +182,6 @@ def test_a_sequence_keeps_what_was_told_of_its_frames(tmp_path):
     assert {text.split(":")[0] for text in told} == {"wave_1", "wave_2"}
 
 
-def test_the_command_line_keeps_notices_in_the_file_it_writes(command, tmp_path):
-    points = np.vstack([sphere_points(), [[0.0, 0.0, 50.0]]])
-    np.savetxt(tmp_path / "a.xyz", points)
-    for verb in ("analyze", "roughness"):
-        assert command.run([verb, str(tmp_path / "a.xyz"), "--out", str(tmp_path / f"{verb}.blend")]) == 0
-        bpy.ops.wm.open_mainfile(filepath=str(tmp_path / f"{verb}.blend"))
-        told = kept(bpy.context.object)
-        assert [(tool, level) for tool, level, _ in told] == [
-            ({"analyze": "Analyze Points", "roughness": "Roughness"}[verb], "WARNING")
-        ] * len(told)
-        assert told or verb == "roughness"
-
-
 def test_a_change_meanwhile_is_told_on_the_object_too():
     """The operator of the job is not asked for: all of them complete alike."""
     running = part("operators.running.job")

@@ -147,11 +147,9 @@ class TestImport:
         assert len(bpy.data.materials) == 1
 
     def test_scenes_that_the_command_line_writes(self, tmp_path, shown):
-        opening = part("operators.files.opening")
-        path = tmp_path / "red.xyz"
-        save(path, evenly(800))
-        obj, _ = opening.load(path)
-        opening.save(tmp_path / "red.blend", obj, {})
+        save(tmp_path / "red.xyz", evenly(800))
+        words = "convert", tmp_path / "red.xyz", "--out", tmp_path / "red.blend"
+        assert part("operators.files.command").run([*map(str, words)]) == 0
         bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "red.blend"))
         assert shown(bpy.data.objects["red"]) == "Color"
 

@@ -9,7 +9,6 @@ from numpy.testing import assert_allclose
 
 from tests.blender.clouds import add_object, local_points, sphere_points
 from tests.blender.operators import refused
-from tests.blender.test_command import run  # noqa: F401
 from tests.blender.test_smooth_colors import add_values
 
 
@@ -153,47 +152,3 @@ def test_a_changed_table_is_told(obj, tmp_path):
     bpy.data.texts.remove(obj.meshfree.profile)
     with refused(obj, "has no profile"):
         bpy.ops.meshfree.export_profile(filepath=str(tmp_path / "a.svg"))
-
-
-class TestVerb:
-    FAR = np.array([400_000.0, 5_000_000.0, 100.0])
-
-    @pytest.fixture
-    def path(self, tmp_path):
-        points = sphere_points(1000)
-        rows = np.column_stack([points + self.FAR, points[:, 0]])
-        np.savetxt(tmp_path / "a.csv", rows, "%.15g", ",", header="x,y,z,wide", comments="")
-        return tmp_path / "a.csv"
-
-    def ends(self):
-        return [
-            f"--{name}={','.join(map(str, self.FAR + end))}" for name, end in (("from", [0, 0, 1]), ("to", [1, 0, 0]))
-        ]
-
-    def test_table_and_picture_in_the_coordinates_of_the_file(self, run, path, tmp_path):  # noqa: F811
-        code, [line] = run("profile", path, *self.ends(), "--out", tmp_path / "out.csv", "--svg")
-        assert code == 0, line
-        assert line["length"] == pytest.approx(0.5 * np.pi, abs=0.1)
-        assert max(line["distances_of_ends"]) < 0.2
-        rows = np.loadtxt(tmp_path / "out.csv", delimiter=",", skiprows=1)
-        assert_allclose(np.linalg.norm(rows[:, 1:4] - self.FAR, axis=1), 1.0, atol=5e-3)
-        assert_allclose(rows[[0, -1], 1:4], line["ends"], rtol=0.0, atol=1e-4)
-        assert_allclose(rows[:, 4], rows[:, 3], rtol=0.0, atol=1e-6)
-        assert_allclose([line["lowest"], line["highest"]], [rows[:, 4].min(), rows[:, 4].max()], rtol=1e-9)
-        texts, (drawn_line,) = drawing((tmp_path / "out.svg").read_text())
-        assert "Height (m)" in texts
-        assert len(drawn_line) == len(rows)
-
-    def test_an_attribute_of_the_file(self, run, path, tmp_path):  # noqa: F811
-        code, [line] = run("profile", path, *self.ends(), "--source", "wide", "--out", tmp_path / "out.csv")
-        assert code == 0, line
-        rows = np.loadtxt(tmp_path / "out.csv", delimiter=",", skiprows=1)
-        assert_allclose(rows[:, 6], rows[:, 1] - self.FAR[0], atol=0.03)
-        assert not (tmp_path / "out.svg").exists()
-
-    def test_what_is_missing_or_wrong(self, run, path):  # noqa: F811
-        assert run("profile", path, self.ends()[0])[0] == 2
-        assert run("profile", path, *self.ends(), "--svg")[0] == 2
-        code, [line] = run("profile", path, self.ends()[0], self.ends()[0].replace("from", "to"))
-        assert code == 1
-        assert "same point" in line["error"]

@@ -10,7 +10,6 @@ from numpy.testing import assert_allclose
 from tests.blender.clouds import add_group, add_object, attribute, local_points, sphere_points
 from tests.blender.conftest import part
 from tests.blender.operators import refused
-from tests.blender.test_command import run  # noqa: F401
 
 FRAMES = 12
 
@@ -232,15 +231,3 @@ def test_modes_play_without_the_extension(cloud, extension):
         assert np.abs(evaluated_motion(cloud) - first).max() > 0.1
     finally:
         handler.attach()
-
-
-def test_the_command_line_gives_the_last_frame(run, core, tmp_path):  # noqa: F811
-    np.savetxt(tmp_path / "a.xyz", sphere_points(500))
-    code, [line] = run(
-        *("simulate", tmp_path / "a.xyz", "--kind", "FRONT", "--frames", "4", "--at=0,0,1"), "--out", tmp_path / "b.ply"
-    )
-    assert code == 0, line
-    table = core.files.read_points(tmp_path / "b.ply")
-    assert table.attributes["lb_motion"].min() > 0.9
-    assert not any("temporary" in notice for notice in line["notices"])
-    assert not list(Path(bpy.app.tempdir).glob("a-*.npy"))

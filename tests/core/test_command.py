@@ -427,6 +427,15 @@ def test_every_verb_explains_itself(run, verb, capsys):
     assert run(verb, "--nonsense") == (2, [])
 
 
+def test_files_of_blender_are_for_blender(run, tmp_path, capsys):
+    (tmp_path / "a.blend").write_bytes(b"BLENDER")
+    code, [line] = run("analyze", tmp_path / "a.blend")
+    assert (code, "blender --command meshfree" in line["error"]) == (1, True)
+    assert run("analyze", write(tmp_path / "a.ply", SPHERE), "--out", tmp_path / "b.blend") == (2, [])
+    assert run_command(["analyze", "a.ply", "--out", "b.blend"], verbs.make_verbs(), "meshfree") == 2
+    assert "blender --command meshfree" in capsys.readouterr().err
+
+
 def test_the_command_line_starts_without_scipy():
     code = "import sys; from command import line, verbs; verbs.make_verbs(); print('scipy' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).parents[2], capture_output=True, text=True)

@@ -285,6 +285,14 @@ class TestWhatIsChosen:
         assert table.points[:, 2].tolist() == [0.0, 2.0]
         assert "left out 1 points of other classes" in table.notices[1]
 
+    def test_options_of_the_command_line(self, run, tmp_path):
+        write_flagged(tmp_path / "a.las")
+        for options, count in ((["--classes", "2"], 1), (["--classes", "2", "--withheld"], 2), ([], 3)):
+            code, [line] = run("info", tmp_path / "a.las", *options)
+            assert (code, line.get("points")) == (0, count), line
+        code, [line] = run("info", tmp_path / "a.las", "--classes", "ground")
+        assert (code, "no class of LAS" in line["error"]) == (1, True)
+
     def test_classes_in_many_blocks(self, tmp_path):
         count = 2**17 + 10
         classes = np.arange(count) % 7

@@ -357,6 +357,16 @@ class TestTables:
         assert_allclose(np.linalg.norm(rows[:, 2:] - FAR, axis=1), 1.0, atol=3e-3)
         assert run("section", source, "--curves")[0] == 2
 
+    def test_a_hole_and_an_open_curve_have_rows_of_their_own(self, run, tmp_path):
+        open_one = SPHERE[SPHERE[:, 1] > 0.0] + [4.0, 0.0, 0.0]
+        source = write(tmp_path / "a.ply", np.concatenate([SPHERE, 0.6 * SPHERE, open_one]))
+        code, [line] = run("section", source, "--plane", "0,0,0", "--out", tmp_path / "a.json")
+        assert code == 0, line
+        kinds = {(row["closed"], row["hole"]): row for row in json.loads((tmp_path / "a.json").read_text())}
+        assert kinds[1, 0]["length"] == pytest.approx(2.0 * np.pi, rel=5e-3)
+        assert kinds[1, 1]["enclosed_area"] == pytest.approx(0.36 * np.pi, rel=1e-2)
+        assert (kinds[0, 0]["enclosed_area"], kinds[0, 0]["length"]) == (0.0, pytest.approx(np.pi, rel=0.05))
+
     def test_without_a_plane_it_cuts_the_middle_and_says_so(self, run, tmp_path):
         source = write(tmp_path / "a.ply", SPHERE)
         code, [line] = run("section", source, "--out", tmp_path / "a.json")
