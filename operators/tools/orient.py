@@ -56,12 +56,11 @@ class OrientNormals(Tool):
         **orienting.ORIENT["holds"].keywords,
     )
     flip: BoolProperty(name="Flip", **orienting.ORIENT["flip"].keywords)
-    shift = 0.0  # of positions in columns of a file
 
     def plan(self, context, obj):
         reading = read_points(context, obj)
         method, flip = self.method, self.flip
-        viewpoint, notices = self.viewpoints(context, obj, reading)
+        viewpoint, notices = self._viewpoints(context, obj, reading)
 
         def orient(measured, progress):
             laplacian, normals, areas = measured.built.laplacian, measured.measures[NORMAL], measured.measures[AREA]
@@ -80,13 +79,13 @@ class OrientNormals(Tool):
 
         return compute
 
-    def viewpoints(self, context, obj, reading):
+    def _viewpoints(self, context, obj, reading):
         """Return the positions from which points, as read, were seen, (3,) or (n, 3), or None, and notices of them."""
         if self.method == "VIEWPOINT":
             return _place(context, obj, self.viewpoint), []
         if self.method != "ATTRIBUTE":
             return None, []
-        vectors = _vectors(obj, self.source) @ reading.matrix.T - (self.shift if self.holds == "POSITIONS" else 0.0)
+        vectors = _vectors(obj, self.source) @ reading.matrix.T
         return orienting.seen_from(vectors, reading.points, self.holds, self.source, obj.name)
 
     def write(self, context, obj, result):

@@ -25,7 +25,6 @@ class Profile(Tool):
 
     changes = False
     asks = ("source", "axis")
-    table = ""  # what was measured, as text with commas
 
     source: StringProperty(name="Attribute", **profiles.PROFILE["source"].keywords)
     axis: EnumProperty(
@@ -34,20 +33,12 @@ class Profile(Tool):
         **profiles.PROFILE["axis"].keywords,
     )
 
-    def ends(self, obj):
-        """Return the two points between which the path leads, (2,) int."""
-        return selected_ends(obj)
-
-    def origin(self, obj):
-        """Return where points as read begin, from where heights are measured, (3,)."""
-        return np.array(obj.matrix_world.translation)
-
     def plan(self, context, obj):
-        ends = self.ends(obj)
+        ends = selected_ends(obj)
         given = _values(obj, self.source) if self.source else None
         _, operator = operator_reader(context, obj)
         own = SimpleNamespace(source=self.source, axis=self.axis)
-        base, place = self.origin(obj), place_of(obj)
+        base, place = np.array(obj.matrix_world.translation), place_of(obj)
 
         def compute(progress):
             laplacian = operator(progress)
@@ -57,10 +48,9 @@ class Profile(Tool):
         return compute
 
     def write(self, context, obj, result):
-        self.table = profiles.table(result.columns, self.source)
         made = plot(obj, f"{obj.name} Profile", result.distance, result.values)
         text = bpy.data.texts.new(f"{made.name}.csv")
-        text.from_string(self.table)
+        text.from_string(profiles.table(result.columns, self.source))
         obj.meshfree.profile = text
         line = profiles.profile_line(result, self, made.name, length_text)
         return [*profiles.missing(result, obj.name), f"{line}. The table is the text {text.name}"]

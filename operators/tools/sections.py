@@ -17,7 +17,6 @@ class CrossSection(Tool):
 
     changes = False
     asks = adjustable = ("plane", "thickness")
-    found = None  # what was measured
 
     plane: StringProperty(
         name="Plane",
@@ -34,8 +33,12 @@ class CrossSection(Tool):
 
     def plan(self, context, obj):
         reading, operator = operator_reader(context, obj)
-        place, normal, guessed = self.cut(context, obj, reading)
-        name = obj.name
+        name, guessed = obj.name, []
+        if self.plane:
+            place, normal = plane_of(context.scene, self.plane, obj)
+        else:
+            place, normal = sections.middle(reading.points), sections.UP
+            guessed = [f"{name} is cut by the horizontal plane through its middle: no Plane is chosen."]
 
         def compute(progress):
             laplacian = operator(progress)
@@ -46,18 +49,11 @@ class CrossSection(Tool):
 
         return compute
 
-    def cut(self, context, obj, reading):
-        """Return a point and a normal of the plane, as points are read, and a notice of what was guessed or ""."""
-        if not self.plane:
-            guessed = f"{obj.name} is cut by the horizontal plane through its middle: no Plane is chosen."
-            return sections.middle(reading.points), sections.UP, guessed
-        return *plane_of(context.scene, self.plane, obj), ""
-
     def write(self, context, obj, result):
-        self.found, lines, guessed = result
+        found, lines, guessed = result
         made = add_curves(obj, f"{obj.name} Section", lines, self.thickness)
-        line = sections.section_line(self.found, made.name, length_text, area_text)
-        return [*filter(None, [guessed]), *self.found.notices, line]
+        line = sections.section_line(found, made.name, length_text, area_text)
+        return [*guessed, *found.notices, line]
 
 
 class MESHFREE_OT_cross_section(CrossSection, ApplicationOperator, bpy.types.Operator):
