@@ -100,13 +100,13 @@ def scans():
     for path in paths:
         laplacian = core.build_laplacian(read_ply(path))
         began = time.perf_counter()
-        spectrum = laplacian.eigenpairs(core.spectral.modes_needed(laplacian, max(PARTS)))
+        laplacian.eigenpairs(core.spectral.modes_needed(laplacian, max(PARTS)))  # which it keeps
         yield Goal("seconds for its modes", form="{:.1f}").row(f"scan, {path.stem}", time.perf_counter() - began)
         wrong, cut, seconds = 0, 0, []
         whole = connected(laplacian.component, laplacian)
         for parts in PARTS:
             began = time.perf_counter()
-            labels = core.spectral.segment(laplacian, parts, spectrum=spectrum)
+            labels = core.spectral.segment(laplacian, parts)
             seconds.append(time.perf_counter() - began)
             wrong += len(np.unique(labels)) != parts or labels.min() < 0
             cut += connected(labels, laplacian) - whole

@@ -74,14 +74,14 @@ def floating_notices(out) -> list:
     ]
 
 
-def resolved_modes(modes: int, compute):
-    """Compute modes, or as many of them as the points resolve, with a notice.
+def resolved_modes(laplacian, modes: int, progress):
+    """Compute modes of an operator, or as many of them as the points resolve, with a notice.
 
     Parameters
     ----------
+    laplacian : LaplaceBeltrami
     modes : int
-    compute : callable
-        Function of a number that returns so many modes.
+    progress : callable
 
     Returns
     -------
@@ -90,12 +90,12 @@ def resolved_modes(modes: int, compute):
         Notices.
     """
     try:
-        return compute(modes), []
+        return laplacian.eigenpairs(modes, progress=progress), []
     except core.UnresolvedModesError as error:
         if error.resolved == 0:
             raise
         notice = f"Only {error.resolved} of {modes} modes were computed: the others are finer than the points resolve."
-        return compute(error.resolved), [notice]
+        return laplacian.eigenpairs(error.resolved, progress=progress), [notice]
 
 
 def continued(spectrum, areas, points, earlier):

@@ -45,7 +45,7 @@ class PartRow(NamedTuple):
         return {name: None if value != value else value for name, value in self._asdict().items()}
 
 
-def part_table(laplacian, labels, values, volume_of, progress):
+def part_table(laplacian, labels, values, volume, progress):
     """Measure all parts of a surface.
 
     Parameters
@@ -55,8 +55,8 @@ def part_table(laplacian, labels, values, volume_of, progress):
         Numbers of segments, below zero for points in none.
     values : ndarray, (n,), or None
         Whose means are wanted.
-    volume_of : callable or None
-        Function of the operator and `progress` that returns its `EnclosedVolume`; None for no volumes.
+    volume : bool
+        Whether to measure the volume within components.
     progress : callable
         Called as ``progress(stage, fraction)``.
 
@@ -68,9 +68,9 @@ def part_table(laplacian, labels, values, volume_of, progress):
         Notices.
     """
     rows, notices = _rows(laplacian, "Component", None, values, progress), []
-    if volume_of is not None:
+    if volume:
         try:
-            rows, notices = _with_volumes(rows, volume_of(laplacian, progress))
+            rows, notices = _with_volumes(rows, core.measure.enclosed_volume(laplacian, progress=progress))
         except core.TooFewPointsError as error:  # for a mesh, not for what else is measured
             notices = [f"There is no volume: {error}"]
     if labels is not None:
@@ -174,10 +174,10 @@ class Base(NamedTuple):
     name: str = ""
 
 
-def pile_over(laplacian, chosen, base, measures, progress):
+def pile_over(laplacian, chosen, base, progress):
     """Measure the volume between a part, (n,) bool, and a `Base`, None for the plane through its rim."""
     if base is None:
-        return core.measure.pile_volume(laplacian, chosen, measures=measures)
+        return core.measure.pile_volume(laplacian, chosen)
     heights = None
     if base.ground is not None:
         rows = np.flatnonzero(chosen & (laplacian.component >= 0))
@@ -185,9 +185,7 @@ def pile_over(laplacian, chosen, base, measures, progress):
         found = core.measure.surface_deviation(base.ground(progress), points, normals, progress=progress)
         heights = np.full(len(chosen), nan)
         heights[rows] = np.where(found.known, found.distance, nan)
-    return core.measure.pile_volume(
-        laplacian, chosen, plane=(base.point, base.normal), heights=heights, measures=measures
-    )
+    return core.measure.pile_volume(laplacian, chosen, plane=(base.point, base.normal), heights=heights)
 
 
 def base_of(plane, normal, place, ground=None, ground_place=None, name=""):
@@ -242,12 +240,12 @@ def volumes_over(laplacian, rows, labels, base, progress):
     """
     if base is None:
         return [{} for _ in rows], []
-    measures, volumes, notices, failed = core.measure.SurfaceMeasures(laplacian), [], [], []
+    volumes, notices, failed = [], [], []
     for row in rows:
         kind, label = row.name.split()
         part = (laplacian.component if kind == "Component" else labels) == int(label)
         try:
-            found = pile_over(laplacian, part, base, measures, progress)
+            found = pile_over(laplacian, part, base, progress)
         except core.InvalidPointsError as error:  # no part of the other cloud is above or below it
             volumes.append(dict.fromkeys(_VOLUMES))
             failed.append(error)

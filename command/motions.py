@@ -164,7 +164,7 @@ def in_modes(laplacian, chosen, count, cache, progress) -> InModes:
     Each touch drives the modes by what it adds to the motion as they hold it, projected onto them: so many numbers for
     each touch, and a formula of the time since then.
     """
-    areas, spectrum = laplacian.areas, cache.lowest_modes(laplacian, count, progress)
+    areas, spectrum = laplacian.areas, laplacian.eigenpairs(count, progress=progress)
     distance, modes = _reach(laplacian, chosen), spectrum.eigenvectors
     if chosen.kind == "WAVE":
         function, rates = "COSINE", distance * np.sqrt(spectrum.eigenvalues)

@@ -32,9 +32,9 @@ def through_middle(name) -> str:
     return f"{name} is cut through its middle: no --plane is given."
 
 
-def cut(laplacian, position, normal, mesh, name, progress):
+def cut(laplacian, position, normal, name, progress):
     """Cut the surface of a cloud of some name by a plane; see `cross_section` of core."""
-    found = core.measure.cross_section(laplacian, position, normal, mesh=mesh, progress=progress)
+    found = core.measure.cross_section(laplacian, position, normal, progress=progress)
     if not found.curves:
         raise core.PointCloudError(
             f'The plane passes beside the surface of "{name}", or only touches it. Move it to where it cuts.'

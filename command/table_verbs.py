@@ -83,7 +83,7 @@ class Section(CutOptions, SurfaceVerb):
             position = position - cloud.place
         else:
             position = arguments.plane - cloud.place
-        found = sections.cut(laplacian, position, normal, None, name, progress)
+        found = sections.cut(laplacian, position, normal, name, progress)
         if output is not None:
             if clouds.kind_of(output) is not None:
                 given.owner.add_curves([(curve.points + cloud.place, curve.closed) for curve in found.curves])

@@ -131,8 +131,7 @@ class Analyze(Frames, SurfaceVerb):
         built = self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress)
         laplacian, spectrum, notices, matched = built.laplacian, None, [], {}
         if own["modes"]:
-            modes = lambda count: laplacian.eigenpairs(count, progress=progress)  # noqa: E731
-            spectrum, notices = analysis.resolved_modes(own["modes"], modes)
+            spectrum, notices = analysis.resolved_modes(laplacian, own["modes"], progress)
         if arguments.sequence:
             places = cloud.points + cloud.place
             spectrum, overlaps, self._earlier = analysis.continued(spectrum, laplacian.areas, places, self._earlier)
@@ -178,7 +177,7 @@ class Measure(ReferenceVerb):
         if values is not None:
             check_numbers(values, name, str(path))
         laplacian = self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress).laplacian
-        rows, notices = part_table(laplacian, labels, values, _volume if own.volume else None, progress)
+        rows, notices = part_table(laplacian, labels, values, own.volume, progress)
         base = base_of(arguments.plane, arguments.normal, cloud.place, *self._ground(arguments, progress))
         volumes, told = volumes_over(laplacian, rows, labels, base, progress)
         records = [row.record() | over for row, over in zip(rows, volumes, strict=True)]
@@ -193,10 +192,6 @@ class Measure(ReferenceVerb):
             return ()
         target, laplacian = self.reference(progress)
         return lambda _: laplacian, target.place, target.path.name
-
-
-def _volume(laplacian, progress):
-    return core.measure.enclosed_volume(laplacian, progress=progress)
 
 
 class StrayPoints(CloudVerb):

@@ -22,7 +22,6 @@ from .piles import pile_volume as pile_volume
 from .profile import Profile as Profile
 from .profile import profile as profile
 from .regions import Region as Region
-from .regions import SurfaceMeasures as SurfaceMeasures
 from .regions import measure_region as measure_region
 from .sections import CrossSection as CrossSection
 from .sections import SectionCurve as SectionCurve

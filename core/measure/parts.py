@@ -13,7 +13,7 @@ from ..frozen import Frozen
 from ..operator import LaplaceBeltrami
 from ..progress import ends_at_one
 from ..types import Bools, Floats, Ints, Progress
-from .regions import LENGTH_OFF, SurfaceMeasures, measure_region
+from .regions import LENGTH_OFF, measure_region, measures_of
 
 
 @dataclass(frozen=True)
@@ -93,14 +93,14 @@ def measure_parts(
     """
     report = progress or (lambda stage, fraction: None)
     parts = _Labelled(laplacian, labels)
-    whole = SurfaceMeasures(laplacian)
+    whole = measures_of(laplacian)
     areas, lengths = parts.sums(whole.areas), parts.sums(whole.boundary_lengths)
     doubt = parts.sums(whole.area_doubts) + np.abs(parts.sums(whole.boundary_doubts))
     doubt_of_lengths = LENGTH_OFF[1] * np.abs(lengths)
     divided = np.flatnonzero(parts.divided())
     for done, part in enumerate(divided):
         report("Parts", done / len(divided))
-        region = measure_region(laplacian, parts.members(part), measures=whole)
+        region = measure_region(laplacian, parts.members(part))
         areas[part], lengths[part] = region.area, region.boundary_length
         doubt[part] = region.area_uncertainty
         doubt_of_lengths[part] = region.length_uncertainty

@@ -14,7 +14,7 @@ from ..frozen import Frozen
 from ..geometry import as_mask
 from ..operator import LaplaceBeltrami
 from ..types import Bools, Floats, Ints
-from .regions import SurfaceMeasures
+from .regions import SurfaceMeasures, measures_of
 from .volume import NOISE
 
 _OPEN = 0.05  # of the volume: what a strip as wide as the part, beyond where the surface ends, adds at most untold
@@ -49,7 +49,6 @@ def pile_volume(
     *,
     plane: tuple[ArrayLike, ArrayLike] | None = None,
     heights: ArrayLike | None = None,
-    measures: SurfaceMeasures | None = None,
 ) -> Pile:
     """Measure the volume between a part of the surface and a plane, as of a heap on the ground.
 
@@ -65,8 +64,6 @@ def pile_volume(
     heights : array_like, (n,), optional
         Heights above another surface, along the vector across the plane, to be measured from instead of the plane [L];
         not finite where that surface is not known. `surface_deviation` with that vector as normals gives them.
-    measures : SurfaceMeasures, optional
-        Of the same operator, kept for many parts: what does not depend on the part.
 
     Returns
     -------
@@ -111,7 +108,7 @@ def pile_volume(
         raise InvalidPointsError(
             f"None of the {len(chosen)} points of the surface is a member, so there is nothing to measure. Choose some."
         )
-    whole = measures or SurfaceMeasures(laplacian)
+    whole = measures_of(laplacian)
     points, rim = laplacian.surface_points, _rim(whole, chosen)
     if plane is None:
         if heights is not None:

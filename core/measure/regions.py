@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -85,6 +85,12 @@ class Region(Frozen):
     length_uncertainty: float
 
 
+def measures_of(laplacian: LaplaceBeltrami) -> SurfaceMeasures:
+    """Return what the measures of all parts have in common, which the operator keeps."""
+    alone = replace(laplacian)  # keeps nothing, so that the two do not hold each other
+    return laplacian.kept.result("measures", lambda: SurfaceMeasures(alone))
+
+
 class SurfaceMeasures:
     """What the measures of all parts of a surface have in common, made once and kept for many parts.
 
@@ -106,23 +112,6 @@ class SurfaceMeasures:
     boundary_doubts : ndarray, (n,)
         By how much the area along that may be wrong, as it is not known where between points and none the surface ends
         [L^2]; to be added up with their signs.
-
-    See Also
-    --------
-    measure_region : Measures one part.
-
-    Examples
-    --------
-    Both halves of the unit sphere have the area 2 pi:
-
-    >>> import numpy as np
-    >>> import meshfree_laplacian as mf
-    >>> points = mf.example_sphere()
-    >>> laplacian = mf.build_laplacian(points)
-    >>> measures = mf.measure.SurfaceMeasures(laplacian)
-    >>> halves = [mf.measure.measure_region(laplacian, side * points[:, 2] > 0, measures=measures) for side in (1, -1)]
-    >>> print([round(half.area / np.pi, 1) for half in halves])
-    [2.0, 2.0]
     """
 
     def __init__(self, laplacian: LaplaceBeltrami) -> None:
@@ -188,7 +177,6 @@ def measure_region(
     laplacian: LaplaceBeltrami,
     members: ArrayLike,
     *,
-    measures: SurfaceMeasures | None = None,
     progress: Progress | None = None,
 ) -> Region:
     """Measure the area of a part of the surface, the length of its boundary, and its centroid.
@@ -199,8 +187,6 @@ def measure_region(
         Of n points.
     members : array_like, (n,) bool, (k,) int or (n,) float
         The points of the part, or the share of each, from 0 to 1, that belongs to it.
-    measures : SurfaceMeasures, optional
-        Of the same operator, kept for many parts: what does not depend on the part.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
@@ -241,7 +227,7 @@ def measure_region(
     """
     report = progress or (lambda stage, fraction: None)
     share = _shares(laplacian, members)
-    whole = measures or SurfaceMeasures(laplacian)
+    whole = measures_of(laplacian)
     report("Line", 0.0)
     near, line = _find_line(whole, share > 0.5, lambda done: report("Line", done))
     report("Areas", 0.9)

@@ -13,7 +13,7 @@ from ..distance import polygon_length
 from ..frozen import Frozen
 from ..operator import ImplicitSurface, LaplaceBeltrami
 from ..progress import ends_at_one
-from ..surface import SurfaceMesh, mesh_surface
+from ..surface import mesh_surface
 from ..types import Bools, Floats, Progress, Report
 from .iso_lines import IsoLine, iso_lines
 
@@ -74,7 +74,6 @@ def cross_section(
     point: ArrayLike,
     normal: ArrayLike,
     *,
-    mesh: SurfaceMesh | None = None,
     progress: Progress | None = None,
 ) -> CrossSection:
     """Cut the surface of points by a plane.
@@ -87,8 +86,6 @@ def cross_section(
         A point of the plane [L].
     normal : array_like, (3,)
         Vector across the plane, of any length.
-    mesh : SurfaceMesh, optional
-        Of the same operator, if there is one: most of the work for a single section.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
@@ -130,7 +127,7 @@ def cross_section(
     """
     place, across = check_plane(point, normal)
     report = progress or (lambda stage, fraction: None)
-    mesh = mesh or mesh_surface(laplacian, progress=progress)
+    mesh = mesh_surface(laplacian, progress=progress)
     report("Section", 0.95)
     spacing = float(np.sqrt(np.median(laplacian.areas[laplacian.component >= 0])))
     lines = iso_lines(mesh.vertices, mesh.faces, (mesh.vertices - place) @ across, [0.0])

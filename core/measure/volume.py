@@ -45,17 +45,13 @@ class EnclosedVolume(Frozen):
 
 
 @ends_at_one
-def enclosed_volume(
-    laplacian: LaplaceBeltrami, *, mesh: SurfaceMesh | None = None, progress: Progress | None = None
-) -> EnclosedVolume:
+def enclosed_volume(laplacian: LaplaceBeltrami, *, progress: Progress | None = None) -> EnclosedVolume:
     """Measure the volume that the surface of points encloses.
 
     Parameters
     ----------
     laplacian : LaplaceBeltrami
         Of n points. The signs of its normals do not matter.
-    mesh : SurfaceMesh, optional
-        Of the same operator, if there is one: most of the work.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
@@ -97,8 +93,13 @@ def enclosed_volume(
     >>> print(round(found.volume, 2), found.uncertainty < 0.2, found.openings)
     4.19 True [0]
     """
+    return laplacian.kept.result("volume", lambda: _volume(laplacian, progress))
+
+
+def _volume(laplacian: LaplaceBeltrami, progress: Progress | None) -> EnclosedVolume:
+    """Measure the volume."""
     report = progress or (lambda stage, fraction: None)
-    mesh = mesh or mesh_surface(laplacian, progress=progress)
+    mesh = mesh_surface(laplacian, progress=progress)
     report("Volume", 0.95)
     kept = laplacian.component >= 0
     unit = float(np.sqrt(np.median(laplacian.areas[kept])))

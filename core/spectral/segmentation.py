@@ -6,10 +6,10 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from ..arguments import real, whole
-from ..errors import ComponentError, InvalidPointsError, PointCloudError, TooFewPointsError, UnresolvedModesError
+from ..errors import ComponentError, PointCloudError, TooFewPointsError, UnresolvedModesError
 from ..geometry import check_values
 from ..kernel import RESOLVED
-from ..operator import LaplaceBeltrami, NearGraph, Spectrum, near_graph
+from ..operator import LaplaceBeltrami, NearGraph, near_graph
 from ..progress import ends_at_one
 from ..types import Array, Floats, Ints, Progress
 
@@ -105,9 +105,7 @@ def nodal_domains(
 
 
 @ends_at_one
-def segment(
-    laplacian: LaplaceBeltrami, parts: int, *, spectrum: Spectrum | None = None, progress: Progress | None = None
-) -> Ints:
+def segment(laplacian: LaplaceBeltrami, parts: int, *, progress: Progress | None = None) -> Ints:
     """Divide the surface into a number of parts, such as the limbs of a figure.
 
     Points are clustered by k-means in the global point signature: coordinates ``phi_k / sqrt(lambda_k)``, here with a
@@ -121,8 +119,6 @@ def segment(
         Of n points.
     parts : int
         How many parts; at least one for each component of the cloud. The others are distributed by area.
-    spectrum : Spectrum, optional
-        Its Neumann modes, to save time; used if there are enough of them, which is ``modes_needed``.
     progress : callable, optional
         Called as ``progress(stage, fraction)``; may raise `Cancelled`.
 
@@ -139,8 +135,6 @@ def segment(
         A number of parts below 1, or more than the points can be divided into.
     ComponentError
         Fewer parts than components.
-    InvalidPointsError
-        A spectrum of other points.
     SolverError
         The eigenvalue solver did not converge.
 
@@ -180,10 +174,6 @@ def segment(
             f"{parts} parts need {components + parts + 1} modes, but {n} points carry at most {n // 3}."
             f" {_advice(n // 3, components)}"
         )
-    if spectrum is not None and len(spectrum.eigenvectors) != n:
-        raise InvalidPointsError(
-            f"The spectrum has {len(spectrum.eigenvectors)} points, the operator {n}. Compute it for the same operator."
-        )
     report = progress or (lambda stage, fraction: None)
     report("Parts", 0.0)
     graph = near_graph(laplacian, _NEIGHBORS)
@@ -192,7 +182,7 @@ def segment(
     share = _distribute(parts, np.bincount(component, areas))
     part = component.copy()
     if parts > components:
-        signature = _signature(laplacian, parts, spectrum, report)[graph.first]
+        signature = _signature(laplacian, parts, report)[graph.first]
         report("Parts", 0.0)
         label = np.concatenate([[0], np.cumsum(share)])
         for number in np.flatnonzero(share > 1):
@@ -245,18 +235,17 @@ def _constant_modes(laplacian: LaplaceBeltrami) -> int:
     return len(np.unique(label[laplacian.component >= 0]))
 
 
-def _signature(laplacian: LaplaceBeltrami, parts: int, spectrum: Spectrum | None, progress: Progress) -> Floats:
+def _signature(laplacian: LaplaceBeltrami, parts: int, progress: Progress) -> Floats:
     """Return the faded global point signature, (n, modes)."""
     constant, count = _constant_modes(laplacian), modes_needed(laplacian, parts)
-    if spectrum is None or len(spectrum.eigenvalues) < count:
-        # Weyl's law, doubled: with more, all eigenvalues would be computed only to be refused.
-        resolved = 2.0 * RESOLVED**2 / (4.0 * np.pi) * np.sum(laplacian.areas / laplacian.smoothing_lengths**2)
-        count = min(count, len(laplacian.points) // 3, int(resolved) + constant)
-        try:
-            spectrum = laplacian.eigenpairs(count, progress=progress)
-        except UnresolvedModesError as error:
-            count = error.resolved
-            spectrum = laplacian.eigenpairs(count, progress=progress)
+    # Weyl's law, doubled: with more, all eigenvalues would be computed only to be refused.
+    resolved = 2.0 * RESOLVED**2 / (4.0 * np.pi) * np.sum(laplacian.areas / laplacian.smoothing_lengths**2)
+    count = min(count, len(laplacian.points) // 3, int(resolved) + constant)
+    try:
+        spectrum = laplacian.eigenpairs(count, progress=progress)
+    except UnresolvedModesError as error:
+        count = error.resolved
+        spectrum = laplacian.eigenpairs(count, progress=progress)
     if count <= constant + parts:
         raise TooFewPointsError(
             f"{parts} parts need {constant + parts + 1} modes, but {len(laplacian.points)} points resolve"

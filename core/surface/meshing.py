@@ -60,6 +60,8 @@ class SurfaceMesh(Frozen):
 def mesh_surface(laplacian: LaplaceBeltrami, detail: float = 1.0, *, progress: Progress | None = None) -> SurfaceMesh:
     """Make a mesh of the surface that the points lie on.
 
+    It is kept by the operator, until another detail is asked for.
+
     Quadrics of near points give the distance of corners of a grid from the surface, in a narrow band around it, and
     which of them are on the same side: signs of normals do not matter. Voxels are as wide as the median spacing of the
     points; where this varies much, as wide as that of the points there, to a factor of two: those of an octree. Each
@@ -114,8 +116,13 @@ def mesh_surface(laplacian: LaplaceBeltrami, detail: float = 1.0, *, progress: P
     >>> print(np.abs(np.linalg.norm(mesh.vertices, axis=1) - 1).max() < 1e-3)
     True
     """
-    report = progress or (lambda stage, fraction: None)
     size = positive(detail, "detail of the mesh")
+    return laplacian.kept.result("mesh", lambda: _mesh(laplacian, size, progress), size)
+
+
+def _mesh(laplacian: LaplaceBeltrami, size: float, progress: Progress | None) -> SurfaceMesh:
+    """Make the mesh."""
+    report = progress or (lambda stage, fraction: None)
     report("Grid", 0.5)
     kept = laplacian.component >= 0
     voxel = np.sqrt(np.median(laplacian.areas[kept])) / size

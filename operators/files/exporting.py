@@ -20,7 +20,6 @@ from ..objects.reading import TYPES, read_points
 from ..objects.result import read_eigenvalues
 from ..objects.splats import LEFT_BEHIND, are_left_behind, has_splats
 from ..registration import Registration, Row
-from ..running import cache
 from ..running.application import build_operator
 from ..running.job import JobOperator
 from ..running.ready import reporting
@@ -169,7 +168,7 @@ class MESHFREE_OT_export_operator(ExportOperator, bpy.types.Operator):
 
         def write(path, progress):
             built = build_operator(reading, options, progress)
-            spectrum = cache.lowest_modes(built.laplacian, count, progress) if count else None
+            spectrum = built.laplacian.eigenpairs(count, progress=progress) if count else None
             progress("Write", 1.0)
             write_arrays(path, analysis.arrays(place, built, spectrum))
             return f"{name}: {built.laplacian.stiffness.nnz:,} weights and {count} modes written to {path.name}"

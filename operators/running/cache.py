@@ -3,7 +3,6 @@
 import hashlib
 from collections import OrderedDict
 from threading import Lock
-from weakref import WeakKeyDictionary
 
 import bpy
 import numpy as np
@@ -15,8 +14,7 @@ from ...command.analysis import Built
 
 LIMIT = 2 << 30  # bytes: the operator of 100,000 points with 100 modes takes 0.4 GB
 _NONE = np.arange(0)  # no splats are left out
-_kept = OrderedDict()  # value and bytes by key, in the order of last use
-_sources = WeakKeyDictionary()  # key of each operator
+_kept = OrderedDict()  # values by key, in the order of last use
 _lock = Lock()  # computations run in threads
 
 
@@ -48,8 +46,6 @@ def build(points, options, boundary, progress, orientation=None, splats=None) ->
         key = content(key, orientation)
         plain = built
         built = fetch(key, lambda: analysis.oriented(plain, orientation))
-    with _lock:
-        _sources[built.laplacian] = key
     return built
 
 
@@ -79,58 +75,17 @@ def fitting(count: int, options, modes: int = 0):
     return core.points_that_fit(width, modes)
 
 
-def lowest_modes(laplacian, count: int, progress, dirichlet=False, raw=False) -> "core.Spectrum":
-    """Return the lowest modes of an operator, computed only if fewer are kept.
-
-    Parameters
-    ----------
-    laplacian : LaplaceBeltrami
-        From `build`.
-    count : int
-    progress : callable
-        Called as ``progress(stage, fraction)``.
-    dirichlet, raw : bool
-        As of `LaplaceBeltrami.eigenpairs`.
-    """
-    progress("Spectrum", 0.0)
-    key = _modes_key(laplacian, dirichlet)
-    known = _get(key)
-    if known is None or len(known.eigenvalues) < count:
-        known = laplacian.eigenpairs(count, raw=True, dirichlet=dirichlet, progress=progress)
-        _put(key, known)
-    lowest = core.Spectrum(known.eigenvalues[:count], known.eigenvectors[:, :count])
-    return lowest if raw else laplacian.corrected(lowest)
+def result(laplacian, name, *settings, compute):
+    """Return the result of a function without arguments that uses an operator, which keeps it."""
+    return laplacian.kept.result(name, compute, *settings)
 
 
-def known_modes(laplacian) -> int:
-    """Return how many modes of an operator are kept."""
-    known = _get(_modes_key(laplacian, False))
-    return 0 if known is None else len(known.eigenvalues)
-
-
-def result(laplacian, *settings, compute):
-    """Return the result of a function without arguments that uses an operator, called only if it is not kept.
-
-    Parameters
-    ----------
-    laplacian : LaplaceBeltrami
-        From `build`.
-    *settings : hashable or ndarray
-        A name, and everything else that the result depends on.
-    compute : callable
-    """
-    return fetch(content(_sources[laplacian], *settings), compute, laplacian)
-
-
-def fetch(key, compute, laplacian=None):
-    """Return the value of a key, computed by a function and kept if there is none.
-
-    The bytes of an operator that the value refers to are not counted again.
-    """
+def fetch(key, compute):
+    """Return the value of a key, computed by a function and kept if there is none."""
     value = _get(key)
     if value is None:
         value = compute()
-        _put(key, value, laplacian)
+        _put(key, value)
     return value
 
 
@@ -163,40 +118,33 @@ def _forget(*_):
     clear()
 
 
-def _modes_key(laplacian, dirichlet):
-    return content(_sources[laplacian], "modes", dirichlet)
-
-
 def _get(key):
     with _lock:
         if key not in _kept:
             return None
         _kept.move_to_end(key)
-        return _kept[key][0]
+        return _kept[key]
 
 
-def _put(key, value, laplacian=None):
-    """Keep a value, and drop those of the oldest use beyond the limit."""
-    size = memory(value, laplacian)
+def _put(key, value):
+    """Keep a value, and drop those of the oldest use beyond the limit; operators grow by what they keep."""
     with _lock:
         _kept.pop(key, None)
-        _kept[key] = value, size
-        source = _sources.get(laplacian) if laplacian is not None else None
-        if source in _kept:  # its results are useless without the operator, and hold its memory
-            _kept.move_to_end(source)
-        total = sum(size for _, size in _kept.values())
-        while total > LIMIT and len(_kept) > 1:
-            total -= _kept.popitem(last=False)[1][1]
+        _kept[key] = value
+        sizes = {each: memory(held) for each, held in _kept.items()}
+        while sum(sizes.values()) > LIMIT and len(_kept) > 1:
+            del sizes[_kept.popitem(last=False)[0]]
 
 
-def memory(value, known=None) -> int:
-    """Return the bytes of all arrays that a value refers to, without those of a known object."""
-    total, found, pending = 0, {id(known)}, [value]
+def memory(value) -> int:
+    """Return the bytes of all arrays that a value refers to."""
+    total, found, pending = 0, set(), [value]
     while pending:
         item = pending.pop()
-        if id(item) in found:
+        known = item.__array_interface__["data"][0] if isinstance(item, np.ndarray) else id(item)  # views count once
+        if known in found:
             continue
-        found.add(id(item))
+        found.add(known)
         if isinstance(item, np.ndarray):
             total += item.nbytes
         elif isinstance(item, dict):

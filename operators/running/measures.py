@@ -79,7 +79,7 @@ def measure(points, options, boundary, budget, modes, progress, orientation=None
         return core.clean.Prolongation(points, subset, laplacian.normals, laplacian.component, progress=report)
 
     progress("All Points", 0.9)
-    prolongation = cache.result(laplacian, "prolongation", points, compute=prolong)
+    prolongation = laplacian.kept.result("prolongation", prolong, points)
     carried = {row.attribute: _carry(prolongation, row, row.of(built), out) for row in _ROWS}
     return Measured(built, subset, carried, prolongation, out)
 

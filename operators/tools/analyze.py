@@ -16,7 +16,6 @@ from ..objects.options import laplacian_options, point_budget
 from ..objects.reading import read_points
 from ..objects.result import analysis_names, area_text, is_trusted, write_result
 from ..registration import Registration, Row
-from ..running import cache
 from ..running.application import ShownOperator
 from ..running.measures import measure
 
@@ -64,7 +63,9 @@ def plan_analysis(context, obj, modes: int = 0, write_limit: int = WRITE_LIMIT, 
             measured = measure(*given, reading.orientation, reading.splats)
             if orient is not None:
                 measured = measure(*given, orient(measured, times), reading.splats)
-            spectrum, unresolved = resolved_modes(measured.built.laplacian, modes, times) if modes else (None, [])
+            spectrum, unresolved = None, []
+            if modes:
+                spectrum, unresolved = analysis.resolved_modes(measured.built.laplacian, modes, times)
             if spectrum is not None and len(measured.subset):
                 times("All Points", 1.0)
                 spectrum = replace(spectrum, eigenvectors=measured.carried(spectrum.eigenvectors[:, :write_limit]))
@@ -79,11 +80,6 @@ def plan_analysis(context, obj, modes: int = 0, write_limit: int = WRITE_LIMIT, 
         )
 
     return compute
-
-
-def resolved_modes(laplacian, modes, progress):
-    """Compute modes, or as many of them as the points resolve, with a notice."""
-    return analysis.resolved_modes(modes, lambda count: cache.lowest_modes(laplacian, count, progress))
 
 
 class AnalysisOperator(ShownOperator):

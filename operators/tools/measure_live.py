@@ -26,7 +26,6 @@ from ..registration import Registration, Row
 from ..running.job import Job
 from ..running.ready import TROUBLES, error_text
 from .measuring import Figure, left_out, measured, volume_base
-from .mesh import volume_of
 from .select import SelectionOperator, analyzed, selection
 
 _REST = 0.2  # seconds without a change after which the selection is measured
@@ -230,7 +229,7 @@ def _enclose(known):
 
     def compute(progress):
         try:
-            found = volume_of(laplacian, progress)
+            found = core.measure.enclosed_volume(laplacian, progress=progress)
         except PointCloudError as error:
             text = f"The volume of the surface was not measured: {error}"
             return lambda: _enclosed(known, [], [text])

@@ -12,7 +12,6 @@ from ..objects.parts import keep_rows
 from ..objects.result import area_text
 from ..registration import Registration, Row
 from ..running.application import ApplicationOperator, Tool, operator_reader
-from .mesh import volume_of
 
 
 class _Table(NamedTuple):
@@ -41,7 +40,7 @@ class MeasureParts(Tool):
         values = _numbers(obj, name) if name else None
 
         def compute(progress):
-            return _Table(*part_table(operator(progress), labels, values, volume_of if volume else None, progress))
+            return _Table(*part_table(operator(progress), labels, values, volume, progress))
 
         return compute
 

@@ -19,7 +19,6 @@ from ..objects.result import area_text, length_text, volume_text
 from ..registration import Registration, Row
 from ..running import cache
 from ..running.application import operator_reader
-from .mesh import volume_of
 from .select import SelectionOperator, analyzed, selected
 
 
@@ -89,7 +88,7 @@ class MESHFREE_OT_measure_selection(SelectionOperator, bpy.types.Operator):
         found = measured(laplacian, chosen, base, lambda *_: None)
         lines, notices = _texts(found), []
         if self.volume:
-            whole = volume_of(laplacian, lambda *_: None)
+            whole = core.measure.enclosed_volume(laplacian)
             lines.append(f"Volume {_within(volume_text, whole.volume, whole.uncertainty)}")
             lines += _pile_text(found, obj.meshfree)
             notices = [*whole.notices, *found.notices]
@@ -131,20 +130,15 @@ def measured(laplacian, chosen, base, progress) -> Measured:
 
     `base` is what volumes are measured over, None for the plane through the rim.
     """
-    whole = cache.result(laplacian, "measures", compute=lambda: core.measure.SurfaceMeasures(laplacian))
-    region = cache.result(
-        laplacian,
-        "region",
-        chosen,
-        compute=lambda: core.measure.measure_region(laplacian, chosen, measures=whole, progress=progress),
-    )
+    measure = lambda: core.measure.measure_region(laplacian, chosen, progress=progress)  # noqa: E731
+    region = laplacian.kept.result("region", measure, chosen)
     known = chosen & (laplacian.component >= 0)
     sizes = np.ptp(laplacian.surface_points[known], axis=0)
-    curvature = cache.result(laplacian, "curvature", compute=lambda: core.measure.mean_curvature(laplacian))[known]
+    curvature = laplacian.kept.result("curvature", lambda: core.measure.mean_curvature(laplacian))[known]
     areas, most = laplacian.areas[known], curvature[np.abs(curvature).argmax()]
     piles, notices = (None, None, None), []
     try:
-        pile = pile_over(laplacian, chosen, base, whole, progress)
+        pile = pile_over(laplacian, chosen, base, progress)
     except core.InvalidPointsError as error:
         notices = [f"{error} Its volume over {'the rim' if base is None else 'that'} was not measured."]
     else:

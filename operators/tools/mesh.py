@@ -17,7 +17,6 @@ from ..objects.handlers import notify
 from ..objects.place import activate, copy_place, hide
 from ..objects.splats import has_splats
 from ..registration import Registration, Row
-from ..running import cache
 from ..running.application import ApplicationOperator, Tool, operator_reader
 from ..running.measures import carry
 
@@ -91,30 +90,10 @@ class MESHFREE_OT_mesh_surface(MeshSurface, ApplicationOperator, bpy.types.Opera
 
 def surface_mesh(laplacian, detail, progress):
     """Return a mesh of the points of an operator, and the `Prolongation` to its vertices, made only once."""
-
-    def make():
-        mesh = bare_mesh(laplacian, detail, progress)
-        return mesh, core.surface.values_on_mesh(laplacian, mesh.vertices, progress=lambda: progress("Results", 0.95))
-
-    return cache.result(laplacian, "mesh", detail, compute=make)
-
-
-def bare_mesh(laplacian, detail, progress):
-    """Return a mesh of the points of an operator, made only once."""
-    return cache.result(
-        laplacian, "bare mesh", detail, compute=lambda: core.surface.mesh_surface(laplacian, detail, progress=progress)
-    )
-
-
-def volume_of(laplacian, progress):
-    """Return the `EnclosedVolume` of an operator, by the mesh that other tools make, too, measured only once."""
-    return cache.result(
-        laplacian,
-        "volume",
-        compute=lambda: core.measure.enclosed_volume(
-            laplacian, mesh=bare_mesh(laplacian, 1.0, progress), progress=progress
-        ),
-    )
+    mesh = core.surface.mesh_surface(laplacian, detail, progress=progress)
+    report = lambda: progress("Results", 0.95)  # noqa: E731
+    carry_to = lambda: core.surface.values_on_mesh(laplacian, mesh.vertices, progress=report)  # noqa: E731
+    return mesh, laplacian.kept.result("values on mesh", carry_to, detail)
 
 
 class _Kept:

@@ -9,7 +9,6 @@ from ..objects.planes import plane_of
 from ..objects.result import area_text, length_text
 from ..registration import Registration, Row
 from ..running.application import ApplicationOperator, Tool, operator_reader
-from .mesh import bare_mesh
 
 
 class CrossSection(Tool):
@@ -42,8 +41,7 @@ class CrossSection(Tool):
 
         def compute(progress):
             laplacian = operator(progress)
-            mesh = bare_mesh(laplacian, 1.0, progress)
-            found = sections.cut(laplacian, place, normal, mesh, name, progress)
+            found = sections.cut(laplacian, place, normal, name, progress)
             lines = [(reading.local(curve.points), curve.closed) for curve in found.curves]
             return found, lines, guessed
 

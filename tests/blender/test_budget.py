@@ -166,14 +166,3 @@ def test_what_is_kept_is_given_back_where_memory_is_short(cache, free):
     with pytest.raises(RuntimeError, match="GB are free"):
         bpy.ops.meshfree.analyze()
     assert not kept & set(cache._kept)
-
-
-def test_command_line(command, tmp_path, capfd):
-    np.save(tmp_path / "a.npy", sphere_points(3000))
-    given = ["analyze", str(tmp_path / "a.npy"), "--out", str(tmp_path / "a.npz")]
-    assert command.run([*given, "--point-budget", "number", "--most-points", "1000", "--modes", "3"]) == 0
-    assert "of 3,000 points" in capfd.readouterr().out
-    with np.load(tmp_path / "a.npz") as arrays:
-        assert arrays["area"].sum() == pytest.approx(4.0 * np.pi, rel=2e-3)
-        assert arrays["eigenvector_003"].shape == (3000,)
-        assert len(arrays["eigenvalues"]) == 3

@@ -46,7 +46,8 @@ COSTLY = {  # where each is called from
     "core": ("build_laplacian", "orient_normals"),
     "core.deform": ("minimal_surface",),
     "core.measure": ("mean_curvature",),
-    "core.surface": ("mesh_surface", "surface_discs", "values_on_mesh"),
+    "core.surface": ("surface_discs", "values_on_mesh"),
+    "core.surface.meshing": ("_mesh",),
     "core.operator.laplacian": ("build_laplacian",),
     "core.algebra.cholesky": ("dpotrf",),
     "core.algebra.solvers": ("conjugate_gradients",),
@@ -177,19 +178,6 @@ def test_a_film_that_was_stopped_is_not_kept(cache, core):
         minimal.shrink(points, boundary, 0.0, 4, options(), stop_later)
 
 
-def test_modes_of_another_boundary_are_others(cache):
-    built = cache.build(wave(), options(), None, silent)
-    free = cache.lowest_modes(built.laplacian, 6, silent)
-    fixed = cache.lowest_modes(built.laplacian, 6, silent, dirichlet=True, raw=True)
-    assert free.eigenvalues[0] < 1e-6 < fixed.eigenvalues[0]
-    again = cache.lowest_modes(built.laplacian, 6, silent)
-    assert_allclose(again.eigenvalues, built.laplacian.eigenpairs(6).eigenvalues, rtol=1e-9, atol=1e-9)
-
-
-def silent(stage, fraction):
-    pass
-
-
 def options():
     return part("operators.objects.options").DEFAULTS
 
@@ -223,16 +211,17 @@ class TestMemory:
         assert made[4:] == ["large"]
         assert len(cache._kept) == 1
 
-    def test_an_operator_is_kept_before_what_it_computed(self, cache, monkeypatch):
+    def test_an_operator_counts_with_what_it_keeps(self, cache, core, monkeypatch):
+        cache.clear()
         laplacian = cache.build(sphere_points(500), options(), None, lambda stage, fraction: None).laplacian
-        before = list(cache._kept)
-        monkeypatch.setattr(cache, "LIMIT", sum(size for _, size in cache._kept.values()) + 1000)
-        made = []
-        for name in ("a", "b", "b", "a"):
-            cache.result(laplacian, name, compute=lambda name=name: made.append(name) or (laplacian, np.zeros(100)))
-        assert made == ["a", "b", "a"]  # the bytes of the operator do not count again, or none were kept
-        assert set(before) < set(cache._kept)
-        assert len(cache._kept) == len(before) + 1
+        size = cache.memory(list(cache._kept.values()))
+        monkeypatch.setattr(cache, "LIMIT", size + 100_000)
+        cache.fetch("a", lambda: np.zeros(50_000, dtype=np.uint8))
+        core.distance.geodesic_distance(laplacian, [0])
+        assert cache.memory(list(cache._kept.values())) > size + 100_000
+        known = set(cache._kept)
+        cache.fetch("b", lambda: np.zeros(50_000, dtype=np.uint8))
+        assert not known & set(cache._kept) - {"a"}
 
     def test_another_file_gives_it_back(self, cache, known_results):
         bpy.app.handlers.load_pre.remove(known_results)
@@ -259,4 +248,4 @@ class TestMemory:
         for thread in threads:
             thread.join()
         assert not failed
-        assert sum(size for _, size in cache._kept.values()) <= 2000
+        assert sum(map(cache.memory, cache._kept.values())) <= 2000

@@ -196,18 +196,18 @@ class TestLive:
         figures, _ = self.shown(live)
         assert figures["Volume"][0] == pytest.approx(4.0 * np.pi / 3.0, rel=0.01)
         again = []
-        monkeypatch.setattr(part("operators.tools.measure_live"), "volume_of", lambda *_: again.append(_))
+        monkeypatch.setattr(part("core.measure.volume"), "_volume", lambda *_: again.append(_))
         bpy.ops.mesh.select_all(action="INVERT")
         assert self.shown(live)[0]["Volume"] == figures["Volume"]
         assert list(self.shown(live)[0])[-1] == "Volume"
         assert again == []
 
-    def test_why_there_is_no_volume_of_the_surface_is_told_beside_the_other_figures(self, obj, monkeypatch):
+    def test_why_there_is_no_volume_of_the_surface_is_told_beside_the_other_figures(self, cache, obj, monkeypatch):
         def refuse(*_):
             raise part("core").PointCloudError("There is no mesh")
 
         module = part("operators.tools.measure_live")
-        monkeypatch.setattr(module, "volume_of", refuse)
+        monkeypatch.setattr(part("core.measure.volume"), "_volume", refuse)
         choose(obj, local_points(obj)[:, 2] > 0.0)
         bpy.ops.object.mode_set(mode="EDIT")
         bpy.ops.meshfree.measure_live()

@@ -28,7 +28,7 @@ def everything(points):
         "eigenvalues": spectrum.eigenvalues,
         "modes": spectrum.eigenvectors,
         "smooth": core.clean.smooth_points(laplacian, core.clean.exponential(0.01)),
-        "segments": core.spectral.segment(laplacian, 4, spectrum=spectrum),
+        "segments": core.spectral.segment(laplacian, 4),
         "harmonic": core.distance.harmonic_field(laplacian, [0, 1], [0.0, 1.0]),
         "distance": core.distance.geodesic_distance(laplacian, [0]),
         "deformed": core.deform.Deformer(laplacian, top, bottom).solve(moved),

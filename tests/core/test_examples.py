@@ -17,7 +17,7 @@ WITHOUT = {  # functions whose examples are those of what they go with, or which
 }
 CLASSES = {
     *("Agreed", "Doubt", "LaplacianOptions", "clean.Prolongation", "clean.Strays", "deform.CoarseDeformer"),
-    *("deform.Deformer", "measure.Slopes", "measure.SurfaceMeasures"),
+    *("deform.Deformer", "measure.Slopes"),
     *("motion.Heat", "motion.ReactionDiffusion", "motion.Wave", "rig.Skinner"),
 }
 METHODS = {f"LaplaceBeltrami.{name}" for name in ("apply", "eigenpairs", "release", "toward")}

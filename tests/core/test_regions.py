@@ -3,7 +3,7 @@ import pytest
 
 import core
 from benchmarks.samplings import random_sphere
-from core.measure.regions import _edge, _find_line, _Line, _second, _slope, _step
+from core.measure.regions import _edge, _find_line, _Line, _second, _slope, _step, measures_of
 
 
 def cap(points, degrees, axis=(0.3, -0.5, 0.8)):
@@ -25,7 +25,7 @@ def test_a_cap_of_random_points_has_the_area_and_the_circle_of_a_sphere(operator
 
 def test_the_line_bends_as_the_circle_does(operators):
     """A window that is chosen by the curvature of its own parabola makes it a quarter larger."""
-    measures = core.measure.SurfaceMeasures(operators("random sphere"))
+    measures = measures_of(operators("random sphere"))
     bend = []
     for axis in random_sphere(12, 1):
         _, line = _find_line(measures, measures.laplacian.points @ axis > np.cos(np.radians(50.0)), lambda done: None)
@@ -36,7 +36,7 @@ def test_the_line_bends_as_the_circle_does(operators):
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_distances_from_a_circle_in_the_plane_are_exact(operators, side):
     laplacian = operators("square grid")
-    points, spacing = laplacian.surface_points, core.measure.SurfaceMeasures(laplacian).spacing.mean()
+    points, spacing = laplacian.surface_points, measures_of(laplacian).spacing.mean()
     middle, radius, angle = points.mean(axis=0), 10.0 * spacing, np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)
     outward = np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
     same = np.ones(60)
@@ -191,29 +191,29 @@ def test_the_area_of_all_is_as_uncertain_as_that_of_its_component():
 
 def test_the_line_of_a_sphere_is_as_long_as_its_circle_on_the_mean(operators):
     """Lines beside it are shorter: without regard to that 0.4 % would be missing from a great circle."""
-    measures = core.measure.SurfaceMeasures(operators("even sphere"))
+    measures = measures_of(operators("even sphere"))
     points, error = measures.laplacian.points, []
     for axis in random_sphere(12, 2):
-        found = core.measure.measure_region(measures.laplacian, points @ axis > 0.0, measures=measures)
+        found = core.measure.measure_region(measures.laplacian, points @ axis > 0.0)
         error.append(found.boundary_length / (2.0 * np.pi) - 1.0)
     assert abs(np.mean(error)) < 0.002
 
 
 def test_lengths_are_within_their_uncertainty(operators):
     """Caps, and a square whose corners the parabolas round."""
-    sphere, within, share = core.measure.SurfaceMeasures(operators("random sphere")), [], []
+    sphere, within, share = measures_of(operators("random sphere")), [], []
     for axis in random_sphere(10, 3):
         for degrees in (15.0, 25.0, 60.0):
             members, length = cap(sphere.laplacian.points, degrees, axis), 2.0 * np.pi * np.sin(np.radians(degrees))
-            found = core.measure.measure_region(sphere.laplacian, members, measures=sphere)
+            found = core.measure.measure_region(sphere.laplacian, members)
             within.append(abs(found.boundary_length - length) < found.length_uncertainty)
             share.append(found.length_uncertainty / length)
     assert np.mean(within) >= 0.9
     assert max(share[2::3]) < 0.03
-    square = core.measure.SurfaceMeasures(operators("random square"))
+    square = measures_of(operators("random square"))
     low = square.laplacian.points.min(axis=0)
     for angle in (0.2, 0.5, 0.7):
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
         inside = (np.abs((square.laplacian.points - low)[:, :2] @ turn - 0.5 * turn.sum(axis=0)) < 0.25).all(axis=1)
-        found = core.measure.measure_region(square.laplacian, inside, measures=square)
+        found = core.measure.measure_region(square.laplacian, inside)
         assert abs(found.boundary_length - 2.0) < found.length_uncertainty < 0.2

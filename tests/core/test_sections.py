@@ -10,37 +10,17 @@ from benchmarks.samplings import fibonacci_sphere, random_sphere
 
 
 @pytest.fixture(scope="module")
-def meshed(operators):
-    """Function from the name of a cloud to its operator and mesh."""
-    made = {}
-
-    def build(name):
-        if name not in made:
-            laplacian = operators(name)
-            made[name] = laplacian, core.surface.mesh_surface(laplacian)
-        return made[name]
-
-    return build
-
-
-def cut(cloud, point, normal):
-    laplacian, mesh = cloud
-    return core.measure.cross_section(laplacian, point, normal, mesh=mesh)
-
-
-@pytest.fixture(scope="module")
 def cylinder():
     rng = np.random.default_rng(5)
     angle, z = rng.uniform(0.0, 2.0 * np.pi, 3000), rng.uniform(0.0, 2.0, 3000)
-    laplacian = core.build_laplacian(np.column_stack([np.cos(angle), np.sin(angle), z]))
-    return laplacian, core.surface.mesh_surface(laplacian)
+    return core.build_laplacian(np.column_stack([np.cos(angle), np.sin(angle), z]))
 
 
 @pytest.mark.parametrize("height", [0.0, 0.5, -0.9])
 @pytest.mark.parametrize("normal", [(0.0, 0.0, 1.0), (2.0, -1.0, 2.0)])
-def test_sections_of_a_sphere_are_circles(meshed, height, normal):
+def test_sections_of_a_sphere_are_circles(operators, height, normal):
     across = np.array(normal) / np.linalg.norm(normal)
-    found = cut(meshed("another random sphere"), height * across, normal)
+    found = core.measure.cross_section(operators("another random sphere"), height * across, normal)
     (circle,) = found.curves
     assert circle.closed
     assert found.length == pytest.approx(2.0 * np.pi * np.sqrt(1.0 - height**2), rel=1e-3)
@@ -50,8 +30,8 @@ def test_sections_of_a_sphere_are_circles(meshed, height, normal):
     assert not found.notices
 
 
-def test_a_torus_cut_flat_is_a_ring(meshed):
-    found = cut(meshed("random torus"), (0.0, 0.0, 0.2), (0.0, 0.0, 1.0))
+def test_a_torus_cut_flat_is_a_ring(operators):
+    found = core.measure.cross_section(operators("random torus"), (0.0, 0.0, 0.2), (0.0, 0.0, 1.0))
     outer, inner = found.curves
     wide = np.sqrt(0.4**2 - 0.2**2)
     assert outer.enclosed_area == pytest.approx(np.pi * (1.0 + wide) ** 2, rel=3e-3)
@@ -60,8 +40,8 @@ def test_a_torus_cut_flat_is_a_ring(meshed):
     assert found.length == pytest.approx(4.0 * np.pi, rel=3e-3)
 
 
-def test_a_torus_cut_upright_is_two_circles(meshed):
-    found = cut(meshed("random torus"), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+def test_a_torus_cut_upright_is_two_circles(operators):
+    found = core.measure.cross_section(operators("random torus"), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     assert [curve.closed for curve in found.curves] == [True, True]
     for curve in found.curves:
         assert curve.length == pytest.approx(2.0 * np.pi * 0.4, rel=3e-3)
@@ -69,13 +49,13 @@ def test_a_torus_cut_upright_is_two_circles(meshed):
 
 
 def test_a_cylinder_cut_aslant_is_an_ellipse(cylinder):
-    found = cut(cylinder, (0.0, 0.0, 1.0), (0.0, 0.5, 1.0))
+    found = core.measure.cross_section(cylinder, (0.0, 0.0, 1.0), (0.0, 0.5, 1.0))
     assert found.length == pytest.approx(4.0 * np.sqrt(1.25) * ellipe(0.2), rel=3e-3)
     assert found.enclosed_area == pytest.approx(np.pi * np.sqrt(1.25), rel=3e-3)
 
 
 def test_along_a_cylinder_the_section_is_open_and_encloses_nothing(cylinder):
-    found = cut(cylinder, (0.5, 0.0, 0.0), (1.0, 0.0, 0.0))
+    found = core.measure.cross_section(cylinder, (0.5, 0.0, 0.0), (1.0, 0.0, 0.0))
     assert [curve.closed for curve in found.curves] == [False, False]
     assert found.length == pytest.approx(4.0, rel=0.015)  # each end is known by a third of a spacing
     assert found.enclosed_area == 0.0
@@ -106,21 +86,21 @@ def test_it_follows_turn_translation_scale_and_order():
     np.testing.assert_allclose(shifted.curves[0].points, 5.0 * before.curves[0].points - 2.0, rtol=0.0, atol=1e-6)
 
 
-def test_beside_the_surface_there_are_no_curves(meshed):
-    found = cut(meshed("another random sphere"), (0.0, 0.0, 1.1), (0.0, 0.0, 1.0))
+def test_beside_the_surface_there_are_no_curves(operators):
+    found = core.measure.cross_section(operators("another random sphere"), (0.0, 0.0, 1.1), (0.0, 0.0, 1.0))
     assert not found.curves
     assert (found.length, found.enclosed_area) == (0.0, 0.0)
 
 
-def test_where_the_plane_only_touches_it_is_said(meshed):
-    found = cut(meshed("another random sphere"), (0.0, 0.0, 0.997), (0.0, 0.0, 1.0))
+def test_where_the_plane_only_touches_it_is_said(operators):
+    found = core.measure.cross_section(operators("another random sphere"), (0.0, 0.0, 0.997), (0.0, 0.0, 1.0))
     assert any("the plane only touches the surface" in notice for notice in found.notices)
 
 
-def test_curves_shorter_than_the_spacing_are_left_out_and_counted(meshed):
-    laplacian, mesh = meshed("another random sphere")
-    top = mesh.vertices[:, 2].max()
-    found = cut((laplacian, mesh), (0.0, 0.0, top - 1e-7), (0.0, 0.0, 1.0))
+def test_curves_shorter_than_the_spacing_are_left_out_and_counted(operators):
+    laplacian = operators("another random sphere")
+    top = core.surface.mesh_surface(laplacian).vertices[:, 2].max()
+    found = core.measure.cross_section(laplacian, (0.0, 0.0, top - 1e-7), (0.0, 0.0, 1.0))
     assert not found.curves
     assert "1 curves shorter than" in found.notices[0]
 
