@@ -12,9 +12,6 @@ DEFAULTS, PAPER_DEFAULTS = LaplacianOptions(), PaperOptions()
 _DEFAULT, _PAPER = (tuple(option.name for option in fields(kind)) for kind in (LaplacianOptions, PaperOptions))
 NAMES = ("laplacian", *dict.fromkeys(_DEFAULT + _PAPER))
 
-# Those, and the settings about reading the object.
-ALL_NAMES = (*NAMES, "boundary_group", "use_modifiers", "leave_out_floaters", "point_budget", "most_points")
-
 # Options for kinds of points.
 PRESETS = {
     "DEFAULT": DEFAULTS,

@@ -128,27 +128,3 @@ def test_files_that_are_missing_or_no_splats_are_told(run, bar, tmp_path):  # no
         code, [line] = run(*arguments)
         assert code == 1
         assert text in line["error"]
-
-
-def test_tools_take_splats_of_a_file_as_such(core, run, bar, tmp_path):  # noqa: F811
-    """Floaters are left out, ellipsoids go along, and results stand beside the columns of the file."""
-    splats = core.splats.read_splats(bar)
-    opacities = splats.opacities.copy()
-    opacities[[3, 700]] = 0.01
-    given, out = tmp_path / "given.ply", tmp_path / "out.ply"
-    core.splats.write_splats(given, core.splats.Splats(**{**vars(splats), "opacities": opacities}))
-    code, [line] = run("analyze", given, "--out", out)
-    assert code == 0, line
-    assert line["left_out_count"] == 2
-    columns, before = core.splats.read_splats(out).file.columns, core.splats.read_splats(given).file.columns
-    assert all((columns[name] == values).all() for name, values in before.items())
-    np.testing.assert_allclose(columns["lb_area"].sum(), line["total_area"], rtol=1e-5)
-    assert {"lb_normal_x", "lb_normal_y", "lb_normal_z"} <= set(columns)
-    assert run("analyze", given, "--no-leave-out-floaters")[1][0]["left_out_count"] == 0
-
-    code, [line] = run("smooth", given, "--out", out)
-    assert code == 0, line
-    before, after = core.splats.read_splats(given), core.splats.read_splats(out)
-    assert list(after.file.columns) == list(before.file.columns)
-    assert np.abs(after.positions - before.positions).max() > 1e-4
-    assert np.abs(after.covariances - before.covariances).max() > 1e-6

@@ -398,8 +398,10 @@ class TestFiles:
         code, [line] = run("analyze", tmp_path / "a.ply", "--out", tmp_path / "b.ply")
         assert (code, line["left_out_count"]) == (0, 5)
         assert any("Floaters left out" in notice for notice in line["notices"])
+        assert run("analyze", tmp_path / "a.ply", "--no-leave-out-floaters")[1][0]["left_out_count"] == 0
         found = core.splats.read_splats(tmp_path / "b.ply")
         assert found.file.columns["lb_area"].sum() == pytest.approx(4.0 * np.pi, rel=0.01)
+        assert {"lb_normal_x", "lb_normal_y", "lb_normal_z"} < found.file.columns.keys()
         code, [line] = run(
             "thin-out", tmp_path / "b.ply", "--by", "number", "--count", 200, "--out", tmp_path / "c.ply"
         )

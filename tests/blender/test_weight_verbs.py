@@ -1,4 +1,4 @@
-"""The verb `rig` of the command line."""
+"""The verbs of weights, which need Blender: `rig` and `transfer-weights`."""
 
 import bpy
 import numpy as np
@@ -6,9 +6,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tests.blender.armatures import add_armature, choose, weights_of
-from tests.blender.conftest import new_file
+from tests.blender.clouds import add_object, sphere_points
+from tests.blender.conftest import new_file, part
 from tests.blender.test_automatic_weights import BONES, rod
-from tests.blender.test_command import run  # noqa: F401
+from tests.blender.test_command import run, write  # noqa: F401
+from tests.blender.test_transfer_weights import BONES as GROUPS
+from tests.blender.test_transfer_weights import height, positions
 
 
 @pytest.fixture
@@ -103,3 +106,41 @@ def test_files_without_an_armature(run, scan, tmp_path):  # noqa: F811
     code, [line] = run("rig", scan, "--armature", tmp_path / "mesh.blend", "--out", tmp_path / "mesh.blend")
     assert (code, "overwrite its input" in line["error"]) == (1, True)
     assert not (tmp_path / "a.blend").exists()
+
+
+@pytest.fixture
+def body(tmp_path):
+    """A file with a rigged sphere that stands aside."""
+    source = add_object(sphere_points(900), "Body")
+    part("operators.rigging.weights").write_weights(source, list(GROUPS), height(positions(source)))
+    source.location = 4.0, 0.0, 0.0
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "rigged.blend"))
+    return tmp_path / "rigged.blend"
+
+
+def test_weights(run, body, tmp_path):  # noqa: F811
+    inputs = [
+        write(tmp_path / f"{name}.csv", sphere_points(count, seed=4) + [4.0, 0.0, 0.0])
+        for name, count in (("a", 500), ("b", 400))
+    ]
+    code, lines = run("transfer-weights", *inputs, "--reference", body, "--out-dir", tmp_path / "out")
+    assert code == 0, lines
+    for line, count in zip(lines, (500, 400), strict=True):
+        assert line["taken_count"] > 0.98 * count
+        assert f"from {body}" in line["done"]
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out" / "a.blend"))
+    obj = bpy.context.object
+    assert [group.name for group in obj.vertex_groups] == list(GROUPS)
+    world = positions(obj) + np.array(obj.matrix_world.translation) + np.array(obj.get("lb_offset", (0, 0, 0)))
+    assert np.abs(weights_of(obj) - height(world)).max() < 0.03
+
+
+def test_files_without_weights_fail(run, body, tmp_path):  # noqa: F811
+    plain = write(tmp_path / "a.csv", sphere_points(500))
+    code, [line] = run("transfer-weights", plain, "--reference", plain)
+    assert code == 1
+    assert "has no weights to transfer" in line["error"]
+    code, [line] = run("transfer-weights", plain, "--reference", body)
+    assert code == 1
+    assert "No point of" in line["error"]
+    assert run("transfer-weights", plain, "--reference", body, "--out", tmp_path / "a.ply")[0] == 2
