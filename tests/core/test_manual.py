@@ -59,7 +59,7 @@ def test_pictures_are_small():
 def messages():
     """All texts in the code, with a mark for what is filled in."""
     for path in sorted(
-        path for folder in ("core", "command", "operators", "ui") for path in (ROOT / folder).rglob("*.py")
+        path for folder in ("core", "tools", "command", "operators", "ui") for path in (ROOT / folder).rglob("*.py")
     ):
         for node in ast.walk(ast.parse(read(path))):
             if isinstance(node, ast.JoinedStr):
