@@ -48,16 +48,17 @@ class _Declared:
     def written(self, cloud, found, subject, own, output):
         """Write what a tool found, and return what to print, and notices."""
         outcome = self.tool.finish(found, subject, own, number_text)
-        notices, count = list(outcome.notices), len(cloud.points)
+        notices, count, values = list(outcome.notices), len(cloud.points), outcome.values
         if outcome.kept is not None:
             count = int(np.count_nonzero(outcome.kept))
+            values = {name: each[outcome.kept] for name, each in values.items()}
         if output is None:
             pass
         elif outcome.points is not None:
             notices += write_moved(output, cloud, outcome.points, subject)
         else:
             given = cloud.given if outcome.kept is None else cloud.taken(outcome.kept)
-            notices += clouds.write(output, given, outcome.values)
+            notices += clouds.write(output, given, values)
         return {"points": count, "done": f"{cloud.path.stem}: {outcome.line}"}, notices
 
 

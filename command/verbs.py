@@ -5,7 +5,6 @@ from types import SimpleNamespace
 from . import analysis, clouds, core, quantities
 from .analysis import WRITE_LIMIT
 from .bending import Deform, SplatInfo
-from .cleaning import STRAYS, check_some_stay, stray_line
 from .cloud_verb import CloudVerb, SurfaceVerb, floaters
 from .measures import (
     OVER,
@@ -34,7 +33,7 @@ from .tool_verb import declared_verbs
 
 def make_verbs() -> list:
     """Return new verbs of all kinds: those on surfaces, those on points, and those that need no object."""
-    others = Measure, Section, Profile, Orient, MinimalSurface, Mesh, Simulate, *_POINTS
+    others = Measure, Section, Profile, Orient, MinimalSurface, Mesh, Simulate, Align, Compare, TransferAttributes
     return [Analyze(), *declared_verbs(), *(verb() for verb in others), *without_object()]
 
 
@@ -192,32 +191,3 @@ class Measure(ReferenceVerb):
             return ()
         target, laplacian = self.reference(progress)
         return lambda _: laplacian, target.place, target.path.name
-
-
-class StrayPoints(CloudVerb):
-    """The verb `stray-points`."""
-
-    name = "stray-points"
-    help = "find points off the surface, and those of small parts beside it; or delete them"
-    bytes_a_point = 3000
-    settings = (
-        Setting("action", "What happens to the stray points", "SHOW", choices=("SHOW", "DELETE")),
-        *STRAYS.values(),
-    )
-
-    def work(self, path, given, arguments, output, progress):
-        cloud, own = clouds.Cloud(path, given), chosen(self.settings, arguments)
-        action, strictness = own.pop("action"), own.pop("strictness")
-        found = core.clean.Strays(cloud.points, progress=progress).chosen(strictness, **own)
-        found[cloud.out] = True
-        check_some_stay(found)
-        written = []
-        if output is not None and action == "DELETE":
-            written = clouds.write(output, cloud.taken(~found), {quantities.STRAY: found[~found]})
-        elif output is not None:
-            written = clouds.write(output, given, {quantities.STRAY: found})
-        line = f"{path.stem}: {stray_line(found)}{', deleted' if action == 'DELETE' and found.any() else ''}"
-        return {"points": len(found) - (action == "DELETE") * int(found.sum()), "done": line}, written
-
-
-_POINTS = StrayPoints, Align, Compare, TransferAttributes

@@ -30,8 +30,8 @@ class Setting(NamedTuple):
         What the number is: a length or an area in the units of the points, an angle [rad], a place or a direction.
     label : str
         In Blender; empty for its name in capitals.
-    high : float or None
-        Where a slider ends, below `most`.
+    low, high : float or None
+        Where a slider begins and ends, within the bounds.
     at_zero : str
         What stands beside it at 0, where that means automatic or unlimited.
     """
@@ -44,6 +44,7 @@ class Setting(NamedTuple):
     choices: tuple[Choice, ...] | tuple[str, ...] = ()
     form: str = ""
     label: str = ""
+    low: float | None = None
     high: float | None = None
     at_zero: str = ""
 

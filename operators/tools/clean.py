@@ -2,81 +2,62 @@
 
 import bpy
 import numpy as np
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
+from bpy.props import BoolProperty
 
 from ... import core
-from ...command.cleaning import STRAYS, check_some_stay, stray_line
 from ...core import PointCloudError
+from ...tools import stray_points
 from ...tools.quantities import COMPONENT, STRAY, quantity
-from ..objects.attributes import read_attribute, tag_changed, write_attribute
+from ...tools.settings import Choice, by_name
+from ..objects.attributes import read_attribute, tag_changed
 from ..objects.deleting import check_deletable, keep_points
+from ..objects.properties import property_of, values_of, with_properties
 from ..objects.reading import read_points
 from ..objects.result import EIGENVALUES, is_analyzed, is_stale
 from ..registration import Registration, Row
 from ..running import cache
-from ..running.application import ShownOperator, Tool
 from ..running.stages import Stages
+from .declared import registration_of
 from .select import SelectionOperator, select, selection
 
-_DONE = {"SHOW": "", "SELECT": ", selected", "HIDE": ", hidden in Edit Mode", "DELETE": ", deleted"}
+_ACTION = by_name(stray_points.TOOL.settings)["action"]
+_SHOW, _DELETE = _ACTION.choices
+_ACTIONS = (
+    _SHOW,
+    Choice("SELECT", "Select", "Select them, and no other points"),
+    Choice("HIDE", "Hide", "Hide them in Edit Mode"),
+    Choice("SEPARATE", "Separate", "Move them to an object of their own"),
+    _DELETE,
+)
 
 
-class StraySettings:
+class StraySettings(with_properties(stray_points.SIZES)):
     """The settings that say which points are stray."""
 
-    strictness: FloatProperty(
-        name="Strictness",
-        soft_min=0.25,
-        soft_max=4.0,
-        **STRAYS["strictness"].keywords,
-    )
-    smallest: IntProperty(
-        name="Small Parts Below",
-        soft_max=1000,
-        **STRAYS["smallest"].keywords,
-    )
-    smallest_area: FloatProperty(
-        name="Small Areas Below",
-        unit="AREA",
-        **STRAYS["smallest_area"].keywords,
-    )
     only_selected: BoolProperty(name="Among Selected", description="Look among the selected points only", default=False)
 
     def finder(self, context, obj):
-        """Read an object, and return a function of a progress callback that finds its stray points, (n,) bool."""
+        """Read an object, and return its points, and a function of a progress callback that finds stray ones, (n,)."""
         reading = read_points(context, obj)
         among = selection(obj) if self.only_selected else np.ones(len(reading.points), dtype=bool)
         if not among.any():
             raise PointCloudError(f'No points of "{obj.name}" are selected. Select some, or turn off Among Selected.')
-        strictness, sizes = self.strictness, {"smallest": self.smallest, "smallest_area": self.smallest_area}
+        own, out = values_of(self, stray_points.SIZES), cache.floating(reading.splats)
 
         def find(progress):
             key = cache.content("strays", reading.points)
             strays = cache.fetch(key, lambda: core.clean.Strays(reading.points, progress=progress))
-            found = strays.chosen(strictness, **sizes)
-            found[cache.floating(reading.splats)] = True
-            return found & among
+            return stray_points.chosen(strays, out, own) & among
 
         return find
 
 
-class StrayPoints(StraySettings, Tool):
-    """The settings and the work of `meshfree.stray_points`."""
+class StrayActions(StraySettings):
+    """What Blender adds to the tool: more that is done with stray points, also with those that are shown."""
 
-    writes = (STRAY,)
+    asks = ()
 
-    action: EnumProperty(
-        name="Action",
-        description="What happens to the stray points",
-        items=[
-            ("SHOW", "Show", "Color them, and change nothing else"),
-            ("SELECT", "Select", "Select them, and no other points"),
-            ("HIDE", "Hide", "Hide them in Edit Mode"),
-            ("SEPARATE", "Separate", "Move them to an object of their own"),
-            ("DELETE", "Delete", "Delete them"),
-        ],
-        default="SHOW",
-    )
+    action: property_of(_ACTION._replace(choices=_ACTIONS))
     as_shown: BoolProperty(
         name="As Shown",
         description="Take the stray points that were found last, and do not look again",
@@ -84,28 +65,33 @@ class StrayPoints(StraySettings, Tool):
         options={"HIDDEN", "SKIP_SAVE"},
     )
 
+    @classmethod
+    def description(cls, context, properties):
+        """Return the tooltip of a button; empty for that of the class."""
+        return {
+            "SELECT": "Select the stray points that are shown",
+            "HIDE": "Hide the stray points that are shown, in Edit Mode",
+            "SEPARATE": "Move the stray points that are shown to an object of their own",
+            "DELETE": "Delete the stray points that are shown",
+        }.get(properties.action if properties.as_shown else "", "")
+
     @property
     def adjustable(self):
-        """Names of the settings in Adjust Last Operation."""
         return ("action",) if self.as_shown else ("action", "strictness", "smallest", "smallest_area", "only_selected")
 
     def plan(self, context, obj):
-        self._check(obj)
-        find = self._known(obj) if self.as_shown else self.finder(context, obj)
-
-        def compute(progress):
-            found = find(progress)
-            check_some_stay(found)
-            return found
-
-        return compute
-
-    def _check(self, obj):
-        """Refuse objects that the action cannot be done on."""
         if self.action == "HIDE" and obj.type != "MESH":
             raise PointCloudError(f'Points of the point cloud "{obj.name}" cannot be hidden. Separate them instead.')
         if self.action in {"SEPARATE", "DELETE"}:
             check_deletable(obj)
+        find, own = self._known(obj) if self.as_shown else self.finder(context, obj), self.own()
+
+        def compute(progress):
+            found = find(progress)
+            stray_points.check_some_stay(found)
+            return found, None, own, None
+
+        return compute
 
     def _known(self, obj):
         if STRAY not in obj.data.attributes:
@@ -114,23 +100,24 @@ class StrayPoints(StraySettings, Tool):
         return lambda progress: found
 
     def write(self, context, obj, result):
-        write_attribute(obj.data, STRAY, result)
-        done = self._act(context, obj, result) if result.any() else ""
-        tag_changed(obj.data)
-        return [f"{obj.name}: {stray_line(result)}{done}"]
+        [line] = super().write(context, obj, result)
+        return [line + (self._act(context, obj, result[0]) if result[0].any() else "")]
 
     def _act(self, context, obj, found):
-        """Do with the stray points, (n,) bool, what the action says, and return a text on it."""
+        """Do with the stray points, (n,) bool, what only Blender can do, and return a text on it."""
         if self.action == "SELECT":
             select(context, obj, found)
-        elif self.action == "HIDE":
+            return ", selected"
+        if self.action == "HIDE":
             obj.data.vertices.foreach_set("hide", found)
             obj.data.vertices.foreach_set("select", selection(obj) & ~found)
-        elif self.action == "SEPARATE":
-            return f', in "{_separate(context, obj, found)}"'
-        elif self.action == "DELETE":
-            keep_points(context, obj, ~found)
-        return _DONE[self.action]
+            tag_changed(obj.data)
+            return ", hidden in Edit Mode"
+        return f', in "{_separate(context, obj, found)}"' if self.action == "SEPARATE" else ""
+
+    def conclude(self, context, objects):
+        if self.action == "SHOW":
+            super().conclude(context, objects)
 
 
 def _separate(context, obj, found):
@@ -145,28 +132,6 @@ def _separate(context, obj, found):
     keep_points(context, part, found)
     keep_points(context, obj, ~found)
     return part.name
-
-
-class MESHFREE_OT_stray_points(StrayPoints, ShownOperator, bpy.types.Operator):
-    """Find stray points: single ones off the surface, small floating parts, and floaters among splats"""
-
-    bl_idname = "meshfree.stray_points"
-    bl_label = "Stray Points"
-    keeps_line = True
-
-    @classmethod
-    def description(cls, context, properties):
-        """Return the tooltip of a button; empty for that of the class."""
-        return {
-            "SELECT": "Select the stray points that are shown",
-            "HIDE": "Hide the stray points that are shown, in Edit Mode",
-            "SEPARATE": "Move the stray points that are shown to an object of their own",
-            "DELETE": "Delete the stray points that are shown",
-        }.get(properties.action if properties.as_shown else "", "")
-
-    def conclude(self, context, objects):
-        if self.action == "SHOW":
-            super().conclude(context, objects)
 
 
 class MESHFREE_OT_select_strays(SelectionOperator, StraySettings, bpy.types.Operator):
@@ -216,11 +181,7 @@ class MESHFREE_OT_select_left_out(SelectionOperator, bpy.types.Operator):
 
 
 TOOLS = (
-    Registration(
-        MESHFREE_OT_stray_points,
-        panel=Row("Clean", 1, 1),
-        menu=Row("Object", 4, 3),
-    ),
+    registration_of(stray_points.TOOL, StrayActions),
     Registration(MESHFREE_OT_select_strays, menu=Row("Points", 1, 7)),
     Registration(MESHFREE_OT_select_left_out, menu=Row("Points", 1, 8)),
 )

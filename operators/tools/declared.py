@@ -1,14 +1,12 @@
 """Blender's operators of the tools that `tools/` declares."""
 
-from types import SimpleNamespace
-
 import bpy
 import numpy as np
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
+from bpy.props import StringProperty
 
 from ... import core
 from ...tools.listed import listed_tools
-from ...tools.quantities import quantity
+from ...tools.quantities import quantity, written_by
 from ...tools.settings import by_name
 from ...tools.tool import MovingTool, PointTool
 from ..objects.attributes import read_attribute, remove_numbered, tag_changed, write_attribute
@@ -16,6 +14,7 @@ from ..objects.curves import read_curve
 from ..objects.deleting import check_deletable, keep_points
 from ..objects.groups import chosen_weights, group_kind, has_group
 from ..objects.positions import check_movable, target_property, write_positions
+from ..objects.properties import properties_of, values_of
 from ..objects.reading import read_points
 from ..objects.result import length_text
 from ..objects.splats import has_splats
@@ -25,33 +24,10 @@ from ..running.application import ApplicationOperator, ShownOperator, Tool, oper
 from ..running.discs import disc_finder
 from .select import read_sources
 
-_FORMS = {
-    "LENGTH": {"subtype": "DISTANCE"},
-    "AREA": {"unit": "AREA"},
-    "DEGREES": {"subtype": "ANGLE"},
-    "SHARE": {"subtype": "FACTOR"},
-    "X,Y,Z": {"subtype": "XYZ"},
-}
-_KINDS = {bool: BoolProperty, int: IntProperty, float: FloatProperty, str: StringProperty, tuple: FloatVectorProperty}
 _CURVE = StringProperty(
     name="Curve",
     description="Curve object on the surface; each of its points is replaced by the nearest one of the cloud",
 )
-
-
-def property_of(setting):
-    """Return the property of Blender for a setting."""
-    if setting.choices:
-        items = list(map(tuple, setting.choices))  # Blender takes no named tuples
-        return EnumProperty(name=setting.title, description=setting.description, default=setting.default, items=items)
-    bounds = {"min": setting.least, "max": setting.most, "soft_max": setting.high}
-    return _KINDS[type(setting.default)](
-        name=setting.title,
-        description=setting.description,
-        default=setting.default,
-        **{name: bound for name, bound in bounds.items() if bound is not None},
-        **_FORMS.get(setting.form, {}),
-    )
 
 
 class ObjectCloud:
@@ -121,7 +97,7 @@ class Declared(Tool):
 
     def own(self):
         """Return the values of the settings as attributes."""
-        return SimpleNamespace(**{setting.name: getattr(self, setting.name) for setting in self.tool.settings})
+        return values_of(self, self.tool.settings)
 
     def plan(self, context, obj):
         reading, operator = operator_reader(context, obj)
@@ -157,7 +133,7 @@ class Pointwise(Declared):
     @property
     def last(self):
         """Names of settings that the tool does not declare."""
-        return () if self.tool.deletes else ("show",)
+        return ("show",) if written_by(self.tool.name) else ()
 
     def plan(self, context, obj):
         if self.tool.deletes:
@@ -218,16 +194,23 @@ class Moving(Declared):
 
 
 def operator_of(tool, *mixins):
-    """Return the class of Blender's operator of a tool, not yet registered; `mixins` come before its own bases."""
-    properties = {setting.name: property_of(setting) for setting in (*tool.settings, *tool.showing)}
+    """Return the class of Blender's operator of a tool, not yet registered.
+
+    `mixins` come before its own bases, and their properties and texts in place of those of the same settings.
+    """
+    properties = properties_of((*tool.settings, *tool.showing))
     if "curve" in tool.reads:
         properties["curve"] = _CURVE
     if isinstance(tool, MovingTool):
         bases = Moving, ApplicationOperator
     elif isinstance(tool, PointTool):
-        bases = Pointwise, ApplicationOperator if tool.deletes else ShownOperator
+        bases = Pointwise, ShownOperator if written_by(tool.name) else ApplicationOperator
     else:
         bases = Declared, ShownOperator
+    at_zero = {setting.name: setting.at_zero for setting in tool.settings if setting.at_zero}
+    for mixin in mixins:
+        properties |= mixin.__annotations__
+        at_zero |= getattr(mixin, "at_zero", {})
     declared = type(
         f"MESHFREE_OT_{tool.name}",
         (*mixins, *bases, bpy.types.Operator),
@@ -237,7 +220,7 @@ def operator_of(tool, *mixins):
             "__annotations__": properties,
             "bl_idname": f"meshfree.{tool.name}",
             "bl_label": tool.label,
-            "at_zero": {setting.name: setting.at_zero for setting in tool.settings if setting.at_zero},
+            "at_zero": at_zero,
             "keeps_line": tool.keeps_line,
             "tool": tool,
         },
