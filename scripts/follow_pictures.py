@@ -68,8 +68,7 @@ def as_splats(points, laplacian):
     """Add splats in place of points: their discs, with the light of one lamp as colors."""
     core = studio.part("core")
     kept = laplacian.component >= 0
-    points, normals, radii = points[kept], laplacian.normals[kept], laplacian.cell_radius[kept]
-    radii = np.minimum(radii, 2.0 * np.median(radii))  # of the few whose cells nothing ends
+    points, normals, radii = points[kept], laplacian.normals[kept], laplacian.disc_radii[kept]
     side = np.cross(normals, np.where(np.abs(normals[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]))
     side /= np.linalg.norm(side, axis=1, keepdims=True)
     frames = np.stack([side, np.cross(normals, side), normals], axis=2)

@@ -23,6 +23,7 @@ from .cloud import (
     with_scatter,
 )
 from .components import find_gaps, gap_reach, label_connected, move_apart, number_sizes
+from .discs import scatter_radii
 from .distances import arc_ahead, arc_squared, circle_arc, dots, pair_heights
 from .doubt import Doubt
 from .moments import LARGEST, MET, TERMS, EdgeTerms, put_terms

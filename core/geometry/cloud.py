@@ -18,6 +18,7 @@ from .bandwidth import depth, mean_gaps, smoothing_lengths
 from .boundary import Boundary, find_boundary, given_boundary, measure_boundary, no_boundary
 from .cells import Cells, measure_cells
 from .components import gap_reach, label_components, move_apart
+from .discs import disc_radii, scatter_radii
 from .distances import measure_squared_slope
 from .doubt import likely_causes
 from .edges import Sides, find_sides, one_side
@@ -90,6 +91,8 @@ class Cloud:
         Areas of the points' Voronoi cells.
     cell_radius : ndarray, (m,)
         Distance of the furthest corner of each cell from its point.
+    disc_radii : ndarray, (m,)
+        Of discs to be drawn: `disc_radii`.
     spacing : ndarray, (m,)
         Distance between neighbouring points.
     misfit : ndarray, (m,)
@@ -117,6 +120,7 @@ class Cloud:
     curvature_scatter: Floats
     cell_areas: Floats
     cell_radius: Floats
+    disc_radii: Floats
     spacing: Floats
     misfit: Floats
     squared_slope: Floats
@@ -246,6 +250,7 @@ def measure_surface(
         curvature_scatter=quadrics.scatter,
         cell_areas=cells.areas,
         cell_radius=cells.radius,
+        disc_radii=disc_radii(nearest, sides.normals, cells),
         spacing=nearest.spacing,
         misfit=quadrics.misfit,
         # Where noise was smoothed, slopes are noise.
@@ -651,7 +656,8 @@ class Discs(Frozen):
         Unit normals, outwards on closed surfaces, up on sheets such as terrain; the z axis at points that lie off the
         surface.
     radii : ndarray, (n,)
-        Of the points' Voronoi cells [L], so that all together leave no hole.
+        Of the points' Voronoi cells [L], so that all together leave no hole; at most three spacings of the points
+        around.
     """
 
     normals: Floats
@@ -718,9 +724,8 @@ def surface_discs(points: ArrayLike, *, progress: Progress | None = None) -> Dis
     """
     report = progress or (lambda stage, fraction: None)
     report("Normals", 0.0)
-    scaled, surface = read_surface(
-        check_points(points), LaplacianOptions(bandwidth="local", neighbors=_DRAWN, projection="off"), report
-    )
+    points = check_points(points)
+    surface = read_surface(points, LaplacianOptions(bandwidth="local", neighbors=_DRAWN, projection="off"), report)[1]
     sample = surface.sample
     oriented = orient_by_winding(sample.nearest, surface.quadrics.normals, sample.places, sample.component)
     report("Discs", 0.5)
@@ -728,6 +733,5 @@ def surface_discs(points: ArrayLike, *, progress: Progress | None = None) -> Dis
     cells = measure_cells(
         sample.nearest, oriented, curvature, everywhere, sample.component, lambda: report("Discs", 0.6)
     )
-    radii = cells.radius * scaled.scale
-    kept = sample.scaled
-    return Discs(kept.scatter(oriented, (0.0, 0.0, 1.0)), kept.scatter(radii, float(np.median(radii))))
+    radii = scatter_radii(disc_radii(sample.nearest, oriented, cells), sample.scaled, points)
+    return Discs(sample.scaled.scatter(oriented, (0.0, 0.0, 1.0)), radii)

@@ -12,7 +12,18 @@ from scipy import sparse
 from ..arguments import check_switches, positive
 from ..errors import InvalidPointsError
 from ..frozen import Frozen
-from ..geometry import Agreed, Cloud, Doubt, arc_length, check_points, check_values, move_apart, read_cloud, toward
+from ..geometry import (
+    Agreed,
+    Cloud,
+    Doubt,
+    arc_length,
+    check_points,
+    check_values,
+    move_apart,
+    read_cloud,
+    scatter_radii,
+    toward,
+)
 from ..kernel import SECOND_MOMENT
 from ..memory import check_memory
 from ..options import LaplacianOptions, check_options
@@ -52,7 +63,9 @@ class LaplaceBeltrami(Frozen):
     curvature_scatter : ndarray, (n,)
         Standard deviation of the mean curvature of local quadrics over that of noise across the surface [1 / L^2].
     cell_radius : ndarray, (n,)
-        Radius of the Voronoi cell [L], up to its furthest corner: discs of this radius leave no hole.
+        Radius of the Voronoi cell [L], up to its furthest corner.
+    disc_radii : ndarray, (n,)
+        Radii of discs that cover the surface [L], at most three spacings of the points around, to be drawn.
     boundary : ndarray, (n,) bool
         Points at a boundary of the surface.
     near_boundary : ndarray, (n,) bool
@@ -94,6 +107,7 @@ class LaplaceBeltrami(Frozen):
     gaussian_curvature: Floats
     curvature_scatter: Floats
     cell_radius: Floats
+    disc_radii: Floats
     boundary: Bools
     near_boundary: Bools
     boundary_distance: Floats
@@ -525,6 +539,7 @@ def laplacian_of(
         cell_radius=scaled.scatter(
             cloud.cell_radius * scaled.scale, float(np.median(cloud.cell_radius)) * scaled.scale
         ),
+        disc_radii=scatter_radii(cloud.disc_radii, scaled, points),
         boundary=scaled.scatter(cloud.boundary.at_boundary, False),
         near_boundary=scaled.scatter(cloud.boundary.reached(pairs.lengths), False),
         boundary_distance=scaled.scatter(cloud.boundary.distance[:, 0] * scaled.scale, np.inf),

@@ -150,7 +150,7 @@ def _write_discs(context, obj):
         return
     laplacian = build_operator(reading, options, lambda *_: None).laplacian
     write_attribute(
-        obj.data, DISC, discs(reading.local_normals(laplacian.normals), laplacian.cell_radius, reading.points)
+        obj.data, DISC, discs(reading.local_normals(laplacian.normals), laplacian.disc_radii, reading.points)
     )
 
 

@@ -22,7 +22,7 @@ def expected(core, obj):
         "lb_boundary": laplacian.boundary,
         "lb_component": laplacian.component,
         "lb_doubt": laplacian.doubt,
-        "lb_disc": normals / np.linalg.norm(normals, axis=1)[:, None] * (laplacian.cell_radius / spacing)[:, None],
+        "lb_disc": normals / np.linalg.norm(normals, axis=1)[:, None] * (laplacian.disc_radii / spacing)[:, None],
         "lb_gaussian_curvature": laplacian.gaussian_curvature,
         "lb_mean_curvature": core.measure.mean_curvature(laplacian),
         "lb_normal": normals / np.linalg.norm(normals, axis=1)[:, None],

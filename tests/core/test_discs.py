@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 import core
-from benchmarks.samplings import random_sphere, torus_points, uneven_sphere
+from benchmarks.samplings import fibonacci_sphere, random_sphere, torus_points, uneven_sphere
 
 SHAPES = {
     "sphere": (random_sphere, 4.0 * np.pi),
@@ -86,3 +86,119 @@ def test_few_points_are_enough():
     assert np.isfinite(core.surface.surface_discs(random_sphere(7)).radii).all()
     with pytest.raises(core.TooFewPointsError):
         core.surface.surface_discs(random_sphere(6))
+
+
+def even_torus(count):
+    """A grid around a torus as of `torus_points`."""
+    wide = round(np.sqrt(2.5 * count))
+    u, v = (2.0 * np.pi * np.arange(steps) / steps for steps in (wide, round(count / wide)))
+    u, v = (values.ravel() for values in np.meshgrid(u, v))
+    return np.stack([(1.0 + 0.4 * np.cos(v)) * np.cos(u), (1.0 + 0.4 * np.cos(v)) * np.sin(u), 0.4 * np.sin(v)], axis=1)
+
+
+def half(points):
+    return points[points[:, 2] > 0.0]
+
+
+def jittered_half_sphere():
+    points = fibonacci_sphere(4000)
+    points += 0.2 * np.sqrt(4.0 * np.pi / 4000) * np.random.default_rng(4).uniform(-1.0, 1.0, points.shape)
+    return half(points / np.linalg.norm(points, axis=1)[:, None])
+
+
+def grid_of_a_wave(jitter=0.0):
+    places = np.stack(np.meshgrid(*[np.linspace(-1.0, 1.0, 45)] * 2), axis=-1).reshape(-1, 2)
+    places = places + jitter / 22.0 * np.random.default_rng(2).uniform(-1.0, 1.0, places.shape)
+    return np.column_stack([places, 0.1 * np.sin(4.0 * places[:, 0])])
+
+
+def below_equator(places):
+    return -places[..., 2]
+
+
+def outside_square(places):
+    return np.abs(places[..., :2]).max(axis=-1) - 1.0
+
+
+# Points, their spacing, how far places are beyond the edge, and how far discs may be: points are jittered across it.
+OPEN = {
+    "even half sphere": (lambda: half(fibonacci_sphere(4000)), np.sqrt(4.0 * np.pi / 4000), below_equator, 1.05),
+    "jittered half sphere": (jittered_half_sphere, np.sqrt(4.0 * np.pi / 4000), below_equator, 1.05),
+    "random half sphere": (lambda: half(random_sphere(8000)), np.sqrt(4.0 * np.pi / 8000), below_equator, 1.3),
+    "grid": (grid_of_a_wave, 1.0 / 22.0, outside_square, 1.05),
+    "jittered grid": (lambda: grid_of_a_wave(0.2), 1.0 / 22.0, outside_square, 1.25),
+    "in millimeters": (lambda: 1e3 * grid_of_a_wave(0.2), 1e3 / 22.0, lambda q: 1e3 * outside_square(q / 1e3), 1.25),
+}
+
+
+def rims(points, discs):
+    """Places all around the discs, (n, 48, 3)."""
+    axes = core.geometry.frames(discs.normals)[:, :, 1:]
+    angle = 2.0 * np.pi * np.arange(48) / 48.0
+    ways = np.einsum("nca,ak->nkc", axes, np.stack([np.cos(angle), np.sin(angle)]))
+    return points[:, None] + discs.radii[:, None, None] * ways
+
+
+@pytest.mark.parametrize("name", OPEN)
+def test_they_end_within_a_spacing_of_an_open_edge(name):
+    make, spacing, beyond, most = OPEN[name]
+    points = make()
+    for discs in (core.surface.surface_discs(points), analyzed(points)):
+        past = beyond(rims(points, discs)).max(axis=1) / spacing
+        # Of random points single ones next to the edge have discs that cover empty places further inside.
+        assert np.mean(past > most) <= (0.001 if "random" in name else 0.0)
+        assert past.max() < 1.6
+
+
+def analyzed(points):
+    """Discs as the operator knows them, drawn after an analysis."""
+    laplacian = core.build_laplacian(points)
+    return core.surface.Discs(laplacian.normals, laplacian.disc_radii)
+
+
+def bush(seed=1):
+    rng = np.random.default_rng(seed)
+    return np.concatenate([grid_of_a_wave(0.2), rng.uniform([-0.3, -0.3, 0.1], [0.3, 0.3, 0.6], (150, 3))])
+
+
+def dense_and_sparse():
+    dense, sparse = fibonacci_sphere(30_000), fibonacci_sphere(600)
+    return np.concatenate([half(dense), sparse[sparse[:, 2] <= 0.0]])
+
+
+@pytest.mark.parametrize("find", [core.surface.surface_discs, analyzed])
+@pytest.mark.parametrize("make", [bush, dense_and_sparse, jittered_half_sphere, lambda: uneven_sphere(4000)])
+def test_none_is_larger_than_three_spacings_of_its_neighborhood(find, make):
+    points = make()
+    distance, index = cKDTree(points).query(points, k=13)
+    spacing = core.geometry.spacing_of(distance)[index].max(axis=1)
+    assert (find(points).radii <= 3.001 * spacing).all()
+
+
+@pytest.mark.parametrize(
+    ("points", "places"),
+    [
+        (random_sphere(3000), random_sphere(20_000, seed=7)),
+        (fibonacci_sphere(3000), random_sphere(20_000, seed=7)),
+        (torus_points(3000), torus_points(20_000, seed=7)),
+        (even_torus(3000), torus_points(20_000, seed=7)),
+        (dense_and_sparse(), random_sphere(20_000, seed=7)),
+    ],
+    ids=["random sphere", "even sphere", "random torus", "even torus", "seven times as dense"],
+)
+def test_nothing_of_a_closed_surface_is_left_uncovered(points, places):
+    assert covered(points, 1.1 * core.surface.surface_discs(points).radii, places) == 1.0  # as large as they are drawn
+
+
+def test_they_turn_with_the_points():
+    points, turn = jittered_half_sphere(), Rotation.from_rotvec([0.5, 1.0, -2.0]).as_matrix()
+    assert_allclose(core.surface.surface_discs(points @ turn.T).radii, core.surface.surface_discs(points).radii, rtol=1e-6)
+
+
+def test_points_left_out_get_no_discs_wider_than_their_spacing_asks():
+    rng = np.random.default_rng(0)
+    clump = [0.0, 0.0, 3.0] + 1e-4 * rng.standard_normal((5, 3))
+    points = np.concatenate([random_sphere(800), clump])
+    distance = cKDTree(points).query(points[-5:], k=13)[0]
+    radii = core.surface.surface_discs(points).radii
+    assert_allclose(radii[-5:], np.minimum(np.median(radii[:-5]), 3.0 * core.geometry.spacing_of(distance)))
