@@ -202,7 +202,10 @@ def heights_over(quadrics: Quadrics, points: Floats, rows: Ints, other: Ints) ->
     -------
     ndarray, (k, views)
     """
-    x, y, z = (points[other, axis] - (points[:, axis] + quadrics.height[:, axis])[rows] for axis in range(3))
+    x, y, z = (
+        points[other, axis] - (points[rows, axis] + quadrics.height[rows, axis])  # not of all points, for some rows
+        for axis in range(3)
+    )
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = (
         [quadrics.shape_operator[:, row, column][rows] for column in range(3)] for row in range(3)
     )
@@ -216,7 +219,7 @@ def chords(points: Floats, rows: Ints, index: Ints) -> Floats:
 
     One coordinate after the other, as arrays whose last axis is three long take several times as long.
     """
-    result = np.empty((3, *index.shape))
+    result, index = np.empty((3, *index.shape)), index.astype(np.intp, copy=False)
     for place, chord in zip(points.T, result, strict=True):
         np.subtract(gathered(place, index), place[rows, None], out=chord)
     return result

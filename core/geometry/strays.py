@@ -53,16 +53,23 @@ def stray_scores(nearest: Nearest, report: Report = lambda: None) -> Floats:
     third = nearest.distance[:, min(_NEAR, nearest.distance.shape[1] - 1)]
     sparse, sparsest = spacing > _SPARSE * around, spacing > GAP * np.median(spacing)
     off, before = third > _LONELY * around, np.zeros(len(spacing), dtype=bool)
-    lonely, over_all, alone = off, third_heights(nearest, surface, np.arange(len(off))), Alone(nearest, surface)
+    over_whole = third_heights(nearest, surface, np.arange(len(off)))
+    lonely, over_all, alone = off, over_whole.copy(), Alone(nearest, surface)
     for _ in range(_ROUNDS):
         report()
         changed = (off != before)[nearest.index].any(axis=1)
-        clean, rows = nearest.keep(~off[nearest.index]), np.flatnonzero(changed)
-        surface = surface.put(rows, fit_quadrics(clean.points, clean.index[rows], clean.weight[rows], rows))
+        gone = off[nearest.index]
+        clean, fewer = nearest.keep(~gone), gone.any(axis=1)
+        # Where all neighbours count, quadrics and heights are those of the start again.
+        rows, whole = np.flatnonzero(changed & fewer), np.flatnonzero(changed & ~fewer)
+        surface = surface.put(whole, nearest.quadrics.take(whole))
+        surface.assign(rows, fit_quadrics(clean.points, clean.index[rows], clean.weight[rows], rows))
         clean = clean.with_quadrics(surface)
-        alone.forget(rows)
-        over = np.flatnonzero(changed[nearest.index].any(axis=1))
-        over_all[over] = third_heights(clean, surface, over)
+        alone.forget(np.flatnonzero(changed))
+        over = changed[nearest.index].any(axis=1)
+        again = over & fewer[nearest.index].any(axis=1)
+        over_all[over] = over_whole[over]
+        over_all[again] = third_heights(clean, surface, np.flatnonzero(again))
         height = _heights(clean, alone, over_all > _ON * spacing, sparse, sparsest, off, lonely)
         before, off = off, height > 1.0
         if (off == before).all():
@@ -84,12 +91,14 @@ def _loneliness(nearest: Nearest, off: Bools) -> Floats:
 
     The spacing is the median of those of the three neighbours. The last of the forty stands for those beyond.
     """
-    known = np.cumsum(~off[nearest.index[:, 1:]], axis=1, dtype=np.int8)
-    rows, last = np.arange(len(off)), known.shape[1]
+    gone = off[nearest.index[:, 1:]]
+    rows, last, fewer = np.arange(len(off)), gone.shape[1], np.flatnonzero(gone.any(axis=1))
+    known = np.cumsum(~gone[fewer], axis=1, dtype=np.int8)
 
     def place(count: int) -> Ints:
         """Return where the neighbour of that number stands, or the last one."""
-        found: Ints = np.minimum(1 + np.count_nonzero(known < count, axis=1), last)
+        found = np.full(len(off), min(count, last))
+        found[fewer] = np.minimum(1 + np.count_nonzero(known < count, axis=1), last)
         return found
 
     few = min(FEW, last)
