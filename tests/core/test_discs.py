@@ -192,7 +192,9 @@ def test_nothing_of_a_closed_surface_is_left_uncovered(points, places):
 
 def test_they_turn_with_the_points():
     points, turn = jittered_half_sphere(), Rotation.from_rotvec([0.5, 1.0, -2.0]).as_matrix()
-    assert_allclose(core.surface.surface_discs(points @ turn.T).radii, core.surface.surface_discs(points).radii, rtol=1e-6)
+    assert_allclose(
+        core.surface.surface_discs(points @ turn.T).radii, core.surface.surface_discs(points).radii, rtol=1e-6
+    )
 
 
 def test_points_left_out_get_no_discs_wider_than_their_spacing_asks():
