@@ -171,7 +171,7 @@ def aim(scene, points, view, margin=0.05, room=LEGEND_WIDTH):
     ----------
     scene : bpy.types.Scene
     points : ndarray, (n, 3)
-        What to see, in the world.
+        What to see, in the world; a few far from the others are left out.
     view : sequence of 3 floats
         Direction from the points towards the camera; the world's z axis points upwards in the picture.
     margin : float
@@ -186,7 +186,7 @@ def aim(scene, points, view, margin=0.05, room=LEGEND_WIDTH):
     """
     right, upward, forward = picture_axes(view)
     axes = np.array([right, upward, forward])
-    x, y, depth = axes @ points.T
+    x, y, depth = axes @ part("core").geometry.without_far(points).T
 
     camera = scene.camera
     data = camera.data

@@ -21,6 +21,11 @@ _CYCLIC = (
 _MAPS = {"VIRIDIS": _VIRIDIS, "MAGMA": _MAGMA, "COOL_WARM": _COOL_WARM, "CYCLIC": _CYCLIC}
 # For -1 as "none", then 0 to 6, distinct in any colour vision: M. Okabe, K. Ito, Color Universal Design, 2008.
 _NONE, *_CLASSES = ("555555", "0072b2", "e69f00", "009e73", "d55e00", "56b4e9", "cc79a7", "f0e442")
+# For classes 0 to 18 of LAS 1.4 as usual, brown ground, green plants, red buildings, blue water; more up to 30.
+_LIDAR = (
+    "7f7f7f c0c0c0 a0642d b5e655 4fc94f 1f7a1f e6332a ff00ff fff200 2a4bff 5c3a8c 404040 f5deb3 ffa07a ff7f00 8b0000"
+    " ffc1e3 00b3b3 99004d 66ccff c98a4b e0ffff 9370db 004d4d 808000 00e6b8 ff6680 2b6f99 c8a200 c71585 1a3320"
+)
 _TRUTH = ("bdbdbd", "d55e00")
 # The same for groups of points, by the names of `operators.groups`.
 _GROUPS = {
@@ -38,13 +43,15 @@ _GROUPS = {
 def colors(name: str, reverse: bool = False) -> list:
     """Return the colours of a map as linear (r, g, b, 1), low to high, as for shaders and colour ramps.
 
-    Those of "TRUTH" are for 0 and 1, those of "CATEGORICAL" for -1, and for 0 to 6 and so on.
+    Those of "TRUTH" are for 0 and 1, those of "CATEGORICAL" for -1, and for 0 to 6 and so on; of "LIDAR" to 30.
     """
     first = []
     if name == "TRUTH":
         codes = _TRUTH
     elif name == "CATEGORICAL":
         first, codes = [_NONE], _CLASSES
+    elif name == "LIDAR":
+        first, codes = [_NONE], _LIDAR.split()
     else:
         codes = _MAPS[name].split()
     return [_color(code) for code in (*first, *(reversed(codes) if reverse else codes))]

@@ -7,7 +7,6 @@ from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, is_
 from ..tools.quantities import quantity
 from .materials import ATTRIBUTE, COLORS, RANGE, shows_own
 from .nodes import DISC_COST, DISCS, MOST, SOLID_NAME
-from .value_range import CLASSES
 
 NAME = "Mesh-Free Display"
 
@@ -102,7 +101,7 @@ def step_colors(obj) -> dict:
     none, *repeated = colors
     names = dict(enumerate(quantity(shown_attribute(obj)).names))
     return {
-        names.get(number, str(number)): none if number < 0 else repeated[number % CLASSES]
+        names.get(number, str(number)): none if number < 0 else repeated[number % len(repeated)]
         for number in range(first, last + 1)
     }
 

@@ -7,7 +7,7 @@ from ..operators.objects.node_trees import TreeBuilder
 from ..operators.objects.splats import BASE
 from . import colormaps
 from .nodes import DEVIATIONS
-from .value_range import CLASSES, STEPPED
+from .value_range import STEPPED
 
 ATTRIBUTE, RANGE, COLORS = "Attribute", "Range", "Colors"  # nodes of the material that are read again
 LINES, BELOW, ABOVE, GRAY = "Iso Lines", "Below", "Above", "Gray"  # and such that only get other values
@@ -150,12 +150,12 @@ def color_by_number(material, name, component, color_map, low, high, settings, g
         Of iso lines in local lengths, where slopes are known.
     """
     stepped = color_map in STEPPED
-    repeated, hiding = color_map == "CATEGORICAL", settings.outside == "HIDE"
+    colors, hiding = colormaps.colors(color_map, settings.reverse), settings.outside == "HIDE"
+    repeated = len(colors) - 1 if stepped and color_map != "TRUTH" else 0
     needed = (RANGE, COLORS, LINES, EVEN, BELOW, ABOVE, *(() if hiding else (GRAY,)))
     if tree := _begin(material, name, f"{component} {repeated} {hiding} {groups}", needed):
         _build_number_tree(tree, component, repeated, hiding, groups)
     nodes = material.node_tree.nodes
-    colors = colormaps.colors(color_map, settings.reverse)
     # Of a stepped map each number is in the middle of its colour, and the last one as wide as the others.
     ends = (-1.5, len(colors) - 1.5) if repeated else (-0.5, len(colors) - 0.5) if stepped else (low, high)
     nodes[RANGE].inputs["From Min"].default_value, nodes[RANGE].inputs["From Max"].default_value = ends
@@ -196,8 +196,8 @@ def _build_number_tree(tree, component, repeated, hiding, groups):
         number = tree.node("ShaderNodeSeparateXYZ", source["Vector"]).outputs[component]
     rise, steep, known = tree.node("ShaderNodeSeparateXYZ", _rise(tree)).outputs
     place = number = tree.math("ADD", number, rise)
-    if repeated:  # -1 and below have one colour, 0 and above repeat; on discs Cycles gives a little less than 7 for 7
-        place = tree.math("MODULO", tree.math("MAXIMUM", tree.math("ROUND", number), -1.0), CLASSES)
+    if repeated:  # -1 and below have one colour, 0 and above repeat; on discs Cycles gives a little less than it is
+        place = tree.math("MODULO", tree.math("MAXIMUM", tree.math("ROUND", number), -1.0), repeated)
     bounds = tree.node("ShaderNodeMapRange", place, name=RANGE)
     ramp = tree.node("ShaderNodeValToRGB", bounds, name=COLORS)
     # Lines in the middle of so many even steps of the range, where values beyond it end.

@@ -195,13 +195,21 @@ def show_sequence(objects, name):
     first = objects[0].meshfree
     values = np.concatenate([read_attribute(obj.data, name) for obj in objects])
     mode = "AUTO" if first.range_mode == "LOCKED" else first.range_mode
-    color_map, low, high = fit_range(values, first.color_map, mode, first.coverage)
+    chosen = "LIDAR" if first.color_map == "AUTO" and _are_lidar_classes(name, values) else first.color_map
+    color_map, low, high = fit_range(values, chosen, mode, first.coverage)
     for obj in objects:
         settings = obj.meshfree
         settings.color_map, settings.range_mode = color_map, "LOCKED"
         settings.range_low, settings.range_high = low, high
         show_attribute(obj, name)
     look_at(objects)
+
+
+def _are_lidar_classes(name, values) -> bool:
+    """Whether an attribute holds classes of LAS files that all have a color of their own."""
+    if name != "classification" or values.dtype.kind not in "iu" or not len(values):
+        return False
+    return values.min() >= 0 and values.max() < len(colormaps.colors("LIDAR")) - 1
 
 
 def show_surface(obj):
@@ -407,6 +415,8 @@ def _color(obj, name, values):
                 choice if choice != "AUTO" else auto
                 for choice, auto in zip(chosen, ("COOL_WARM", "SYMMETRIC"), strict=True)
             ]
+        if _are_lidar_classes(name, values) and settings.color_map == "AUTO":
+            chosen[0] = "LIDAR"
         counted = without_unreached(name, shown)
         color_map, low, high = fit_range(counted, *chosen, settings.coverage, locked, is_distance(name, values, part))
         if settings.range_mode != "LOCKED":

@@ -16,7 +16,7 @@ from ..operators.objects.attributes import (
 )
 from . import colormaps
 from .materials import BEYOND, direction_color
-from .value_range import CLASSES, STEPPED
+from .value_range import STEPPED
 
 
 def number_colors(color_map, low, high, settings):
@@ -30,7 +30,8 @@ def number_colors(color_map, low, high, settings):
     def of(values):
         if color_map in STEPPED:
             whole = np.rint(values).astype(int)
-            steps = np.where(whole < 0, 0, 1 + whole % CLASSES) if color_map == "CATEGORICAL" else np.clip(whole, 0, 1)
+            repeated = np.where(whole < 0, 0, 1 + whole % (len(colors) - 1))
+            steps = np.clip(whole, 0, 1) if color_map == "TRUTH" else repeated
             result = colors[steps]
         else:
             place = np.clip((values - low) / (high - low), 0.0, 1.0) * (len(colors) - 1)

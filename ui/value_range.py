@@ -3,7 +3,7 @@
 import numpy as np
 
 CLASSES = 7  # whole numbers from 0 with a colour of their own, which then repeat
-STEPPED = ("TRUTH", "CATEGORICAL")  # maps with a colour for each whole number
+STEPPED = ("TRUTH", "CATEGORICAL", "LIDAR")  # maps with a colour for each whole number
 _BINS = 60
 
 
@@ -16,7 +16,7 @@ def fit_range(
     ----------
     values : ndarray, (n,)
         Numbers or truth values.
-    name : {"AUTO", "VIRIDIS", "MAGMA", "COOL_WARM", "CYCLIC", "CATEGORICAL"}
+    name : {"AUTO", "VIRIDIS", "MAGMA", "COOL_WARM", "CYCLIC", "CATEGORICAL", "LIDAR"}
         AUTO takes two colours for truth values, one for each of few whole numbers, and the diverging map if the values
         reach clearly to both sides of zero.
     mode : {"AUTO", "DATA", "PERCENTILE", "SYMMETRIC", "LOCKED"}
@@ -25,7 +25,7 @@ def fit_range(
         whose ends would not meet otherwise, and PERCENTILE for all else.
     coverage : float
         Percentage of the values between the percentiles, so that a few outliers do not dominate; all of them
-        for whole numbers and truth values, and where it is not a number.
+        for truth values and of stepped maps, and where it is not a number.
     locked : tuple of float
         Range to keep.
     from_zero : bool
@@ -45,8 +45,8 @@ def fit_range(
     ends = (values.min(), values.max()) if len(values) else (0.0, 1.0)
     if name == "AUTO" and kind == "i" and len(values) and ends[0] >= -1 and ends[1] < CLASSES:
         name = "CATEGORICAL"
-    whole = kind != "f" or np.isnan(coverage)  # whole numbers have no outliers; Blender takes NaN for any number
-    outside = 0.0 if whole else 0.5 * (100.0 - coverage)
+    every = kind == "b" or name in STEPPED or np.isnan(coverage)  # Blender takes NaN for any number
+    outside = 0.0 if every else 0.5 * (100.0 - coverage)
     share = np.percentile(values, (outside, 100.0 - outside)) if len(values) else ends
     if share[0] == share[1]:  # most values are equal: show the few others
         share = ends

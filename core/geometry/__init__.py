@@ -26,6 +26,7 @@ from .components import find_gaps, gap_reach, label_connected, move_apart, numbe
 from .discs import scatter_radii
 from .distances import arc_ahead, arc_squared, circle_arc, dots, pair_heights
 from .doubt import Doubt
+from .framing import without_far
 from .moments import LARGEST, MET, TERMS, EdgeTerms, put_terms
 from .nearest import (
     COUNT,

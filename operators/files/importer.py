@@ -1,18 +1,24 @@
 """What all imports of points have in common: their settings, and what happens to the new objects."""
 
+import math
 from pathlib import Path
 
 import bpy
+import numpy as np
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
+from ... import core
 from ...core import PointCloudError
 from ...core.files import LasChoices, parse_classes
 from ..objects.all_or_nothing import all_or_nothing
+from ..objects.attributes import own_positions
 from ..objects.place import offset_of
+from ..objects.reading import TYPES
 from ..running.job import JobOperator
 from .columns import column_notices
 
+_SENSOR = 36.0  # half the width of what a view of a lens shows, in its unit
 _DEPTH = 10.0  # clipping distance of views relative to that of their center
 _KINDS = [("MESH", "Mesh", "A mesh of loose vertices, which Edit Mode can select and vertex groups can hold")]
 if bpy.app.version >= (4, 5, 0):
@@ -140,11 +146,35 @@ def convert(context, objects):
 
 
 def _frame_selected(context):
-    """Frame the selected objects in all 3D views of the window."""
+    """Frame the selected objects in all 3D views of the window, without a few points far from all others."""
+    points = np.concatenate([_world_points(obj) for obj in context.selected_objects] or [np.zeros((0, 3))])
+    near = core.geometry.without_far(points) if len(points) else points
     for area in context.window.screen.areas:
         if area.type == "VIEW_3D":
             region = next(region for region in area.regions if region.type == "WINDOW")
             with context.temp_override(area=area, region=region):
-                bpy.ops.view3d.view_selected()
                 space, view = area.spaces.active, area.spaces.active.region_3d
+                if len(near) == len(points):
+                    bpy.ops.view3d.view_selected()
+                else:  # which would frame strays, too
+                    _look_at(near, region, space)
                 space.clip_end = max(space.clip_end, _DEPTH * view.view_distance)  # else large scans are clipped
+
+
+def _world_points(obj):
+    """Read the points of an object in the world that are finite, (n, 3)."""
+    points = own_positions(obj.data) if obj.type in TYPES else np.zeros((0, 3))
+    matrix = np.array(obj.matrix_world)
+    return points[np.isfinite(points).all(axis=1)] @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def _look_at(points, region, space):
+    """Let a 3D view show points, (n, 3), from where it looks."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    view = space.region_3d
+    if view.view_perspective == "CAMERA":
+        view.view_perspective = "PERSP"
+    view.view_location = 0.5 * (low + high)
+    wide = max(region.width, region.height) / max(min(region.width, region.height), 1)
+    slope = _SENSOR / space.lens / wide  # of the nearer edge of the view
+    view.view_distance = max(0.5 * float(np.linalg.norm(high - low)) * math.hypot(1.0, 1.0 / slope), 1e-3)

@@ -117,6 +117,7 @@ class MESHFREE_OT_import_points(ImportOperator, bpy.types.Operator):
             self.tell(obj, table, shared, f"{len(table.points):,} points")
             if isinstance(found, str):
                 self.note(f"{obj.name} is shown as dots. {found}", obj)
+                surfaces.append(obj)  # by the same display, so that renders show them, too
             elif found is not None:
                 surfaces.append(obj)
                 if DISC not in obj.data.attributes:  # else the file has them

@@ -8,13 +8,19 @@ _COLOR_MAPS = (
     (
         "AUTO",
         "Automatic",
-        "Cool to Warm for signed values, a color each for few whole numbers and for true or false, Viridis otherwise",
+        "Cool to Warm for signed values, a color each for few whole numbers, for true or false, and for classes of"
+        " lidar, Viridis otherwise",
     ),
     ("VIRIDIS", "Viridis", "From dark blue to yellow, in even steps to the eye"),
     ("MAGMA", "Magma", "From black over red to light yellow, in even steps to the eye"),
     ("COOL_WARM", "Cool to Warm", "From blue over light gray to red, centered on zero"),
     ("CYCLIC", "Cyclic", "Through all hues back to the first one, for angles and phases"),
     ("CATEGORICAL", "Categorical", "A color for each whole number; seven, which then repeat"),
+    (
+        "LIDAR",
+        "Lidar Classes",
+        "Brown ground, green plants, red buildings, blue water: the classes of LAS files, 0 to 30",
+    ),
 )
 _RANGE_MODES = (
     (

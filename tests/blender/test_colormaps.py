@@ -150,3 +150,9 @@ def test_units(units, name, greatest, settings, symbol, factor):
     found = units.unit(units.attribute_power(name), greatest, scene_units(**settings))
     assert found[0] == symbol
     assert found[1] == pytest.approx(factor)
+
+
+def test_classes_of_lidar_have_a_color_each(colormaps):
+    _, *colors = np.array([colormaps.to_display(color)[:3] for color in colormaps.colors("LIDAR")])
+    apart = np.linalg.norm(np.array(colors)[:, None] - colors, axis=2) + np.eye(len(colors))
+    assert (len(colors), apart.min() > 0.15) == (31, True)

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from tests.blender.clouds import add_object, attribute, everything, sphere_points
 from tests.blender.conftest import part
@@ -724,3 +725,29 @@ def test_nodes_that_somebody_deletes(display, overlay, obj, name):
     bpy.ops.meshfree.colormap(attribute="lb_area")
     assert display.shown_attribute(obj) == "lb_area"
     assert len(overlay.pictures(obj, bpy.context.scene)) == 2
+
+
+def test_an_attribute_of_classes_takes_them(extension):
+    obj = add_object(sphere_points(50))
+    classes = np.resize([1, 2, 6, 9, 26], 50)
+    obj.data.attributes.new("classification", "INT", "POINT").data.foreach_set("value", classes.astype(np.int32))
+    bpy.ops.meshfree.colormap(attribute="classification")
+    steps = extension.ui.display.step_colors(obj)
+    shown = [steps[str(number)][:3] for number in (1, 2, 6, 9, 26)]
+    brown, blue = shown[1], shown[3]
+    assert brown[0] > brown[1] > brown[2]
+    assert blue[2] > max(blue[:2])
+    assert len(set(shown)) == 5
+    assert_allclose(shown, np.array(part("ui.colormaps").colors("LIDAR"))[1:, :3][[1, 2, 6, 9, 26]], atol=1e-6)
+
+
+def test_the_frame_leaves_strays_out(extension):
+    shell = 3.0 * sphere_points(2600)
+    obj = add_object(np.concatenate([shell, 100.0 * sphere_points(25)]) + (7.0, 0.0, 0.0))
+    obj.select_set(True)
+    area = next(area for area in bpy.context.window.screen.areas if area.type == "VIEW_3D")
+    extension.operators.files.importer._frame_selected(bpy.context)
+    view = area.spaces.active.region_3d
+    assert_allclose(view.view_location, [7.0, 0.0, 0.0], atol=0.1)
+    assert 3.0 < view.view_distance < 60.0
+    assert area.spaces.active.clip_end > 2.0 * view.view_distance

@@ -88,6 +88,16 @@ def test_range_of_special_values(values, low, high):
     assert fit_range(values, coverage=coverage)[1:] == pytest.approx((low, high))
 
 
+@pytest.mark.parametrize("kind", [np.int32, np.float64])
+def test_a_few_glints_do_not_dominate_intensities(kind):
+    values = np.append(np.linspace(10, 500, 2495), np.full(5, 60_000)).astype(kind)
+    low, high = fit_range(values, coverage=98.0)[1:]
+    assert 10 <= low < 20
+    assert 490 < high <= 500
+    assert fit_range(values, mode="PERCENTILE", coverage=100.0)[1:] == (10.0, 60_000.0)
+    assert fit_range(values, mode="DATA", coverage=98.0)[1:] == (10.0, 60_000.0)
+
+
 def test_ranges_of_distances_begin_at_zero():
     values = np.append(np.linspace(0.5, 8.0, 99), 100.0)
     assert fit_range(values, coverage=98.0, from_zero=True)[1:] == (0.0, fit_range(values, coverage=98.0)[2])
