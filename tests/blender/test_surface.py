@@ -329,8 +329,8 @@ class TestImport:
         assert notice == ("lb_disc" not in obj.data.attributes)
         assert len(obj.modifiers) == 1
 
-    def test_four_points_are_dots(self, tmp_path, capfd, extension):
-        assert not extension.ui.display.draws_discs(self.run(tmp_path, np.eye(4)[:, :3]))
+    def test_four_points_are_dots(self, tmp_path, capfd):
+        assert "lb_disc" not in self.run(tmp_path, np.eye(4)[:, :3]).data.attributes
         assert "scan is shown as dots" in capfd.readouterr().out
 
     def test_discs_of_the_file_are_kept(self, tmp_path):
