@@ -68,7 +68,7 @@ UNTUNED = {  # why a number is no constant: its names, with the module where oth
     "how many neighbors are searched among": ("moments._MORE", "rows._WIDER", "boundary._REACH"),
     "what is lost in rounding": ("_SAME", "_EVEN", "_SMALLEST", "_RIDGE", "_AT_BOUNDARY", "cells._CLOSEST", "NO_AREA"),
     "rounds after which an iteration has long ended": ("moments._STEPS", "edges._ROUNDS"),
-    "how many terms there are": ("TERMS", "edges._COEFFICIENTS"),
+    "how many terms or directions there are": ("TERMS", "edges._COEFFICIENTS", "NEXT"),
     "what only a notice or a drawing goes by": ("_NARROW", "bandwidth._STEPS", "cloud._DRAWN", "_TOLD"),
     "what follows from others": ("HOLE",),
     "what the matrix does not go by": ("quadrics._FADING",),
