@@ -70,17 +70,18 @@ class SurfaceVerb(CloudVerb):
         for setting in LAPLACIAN.values():
             add_setting(parser, setting)
 
-    def boundary(self, cloud, values):
-        """Return the boundary points that a group or column names, (n,) bool; None if none does."""
-        name = values["boundary_group"]
-        return cloud.members(name, "--boundary-group") if name else None
-
     def build(self, cloud, values, progress):
         """Return the operator of a cloud, by the values of the settings in `LAPLACIAN`."""
-        boundary = self.boundary(cloud, values)
+        boundary = boundary_of(cloud, values)
         built = analysis.build(cloud.points, laplacian_options(values), boundary, cloud.out, progress)
         sides = cloud.columns.get(quantities.ORIENTATION)
         return built if sides is None else analysis.oriented(built, sides)
+
+
+def boundary_of(cloud, values):
+    """Return the boundary points that a group or column names, (n,) bool; None if none does."""
+    name = values["boundary_group"]
+    return cloud.members(name, "--boundary-group") if name else None
 
 
 def floaters(arguments) -> bool:

@@ -6,8 +6,8 @@ from . import core, tools
 from .clouds import kind_of
 from .settings import place
 
-FIXED, SOURCE, LOW, HIGH, VALUE = (getattr(tools.groups, name) for name in ("FIXED", "SOURCE", "LOW", "HIGH", "VALUE"))
-is_chosen, column_weights, check_enough = tools.groups.is_chosen, tools.groups.column_weights, tools.groups.check_enough
+SOURCE = tools.groups.SOURCE
+column_weights, check_enough = tools.groups.column_weights, tools.groups.check_enough
 
 
 def read_weights(cloud, name: str, option: str, least: int = 1, outside: float = 0.0):

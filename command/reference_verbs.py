@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from . import alignment, clouds, colors, comparison, core, quantities, transferring
-from .cloud_verb import CloudVerb, SurfaceVerb, floaters
+from .cloud_verb import CloudVerb, SurfaceVerb, boundary_of, floaters
 from .naming import naming
 from .results import number_text
 from .settings import LAPLACIAN, chosen
@@ -81,7 +81,7 @@ class ReferenceVerb(WithReference, SurfaceVerb):
 
     def target(self, path, given):
         cloud = clouds.Cloud(path, given, floaters(self._own))
-        self.boundary(cloud, vars(self._own))
+        boundary_of(cloud, vars(self._own))
         return cloud
 
     @property

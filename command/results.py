@@ -11,6 +11,6 @@ class Told(NamedTuple):
     line: str
 
 
-def number_text(value) -> str:
-    """Write a length or an area of a file, whose unit is not known."""
+def number_text(value, power=1) -> str:
+    """Write a length, or with another power an area or a volume, of a file, whose unit is not known."""
     return f"{value:.4g}"

@@ -1,16 +1,16 @@
 """The subcommands of the tools that `tools/` declares."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 
 from . import clouds, core, tools
-from .cloud_verb import CloudVerb, SurfaceVerb, floaters
+from .cloud_verb import CloudVerb, SurfaceVerb, boundary_of, floaters
 from .groups import add_at, check_sources, read_sources, read_weights
-from .moving_verbs import write_moved
 from .results import number_text
-from .settings import LAPLACIAN, chosen
+from .settings import LAPLACIAN, chosen, default_options
 
 
 class _Declared:
@@ -48,17 +48,14 @@ class _Declared:
     def written(self, cloud, found, subject, own, output):
         """Write what a tool found, and return what to print, and notices."""
         outcome = self.tool.finish(found, subject, own, number_text)
-        notices, count, values = list(outcome.notices), len(cloud.points), outcome.values
+        notices, count, given, values = list(outcome.notices), len(cloud.points), cloud.given, outcome.values
         if outcome.kept is not None:
-            count = int(np.count_nonzero(outcome.kept))
+            count, given = int(np.count_nonzero(outcome.kept)), cloud.taken(outcome.kept)
             values = {name: each[outcome.kept] for name, each in values.items()}
-        if output is None:
-            pass
-        elif outcome.points is not None:
-            notices += write_moved(output, cloud, outcome.points, subject)
-        else:
-            given = cloud.given if outcome.kept is None else cloud.taken(outcome.kept)
-            notices += clouds.write(output, given, values)
+        elif outcome.points is not None and output is not None:
+            given = _moved(cloud, outcome.points, subject)
+        if output is not None:
+            notices += clouds.write(output, given, values, numbers=outcome.numbers)
         return {"points": count, "done": f"{cloud.path.stem}: {outcome.line}"}, notices
 
 
@@ -71,7 +68,7 @@ class ToolVerb(_Declared, SurfaceVerb):
         laplacian = self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress).laplacian
         found = self.tool.compute(laplacian, inputs, own, progress)
         figures, notices = self.written(cloud, found, laplacian, own, output)
-        return figures, [*laplacian.notices, *notices]
+        return figures, [*dict.fromkeys([*laplacian.notices, *notices])]
 
 
 class PointVerb(_Declared, CloudVerb):
@@ -89,6 +86,14 @@ class PointVerb(_Declared, CloudVerb):
         return self.written(cloud, found, cloud.points, own, output)
 
 
+def _moved(cloud, points, laplacian):
+    """Return the file's content with points moved, and splats deformed by the gradients that their operator gives."""
+    given, moved = cloud.given, points - cloud.points
+    if cloud.splats is not None:
+        return given.deformed(given.positions + moved, core.deform.deformation_gradients(laplacian, points))
+    return replace(given, points=given.points + moved)  # so that points that stay keep all of their digits
+
+
 def declared_verbs() -> list:
     """Return the subcommands of all declared tools."""
     declared = tools.listed.listed_tools()
@@ -104,6 +109,16 @@ class FileCloud:
         self._cloud, self._arguments = cloud, arguments
         self.name, self.where = cloud.path.stem, str(cloud.path)
         self.points, self.out = cloud.points, cloud.out
+
+    @property
+    def boundary(self):
+        """The points of the boundary that an option names, (n,) bool; None if it names none."""
+        return boundary_of(self._cloud, chosen(LAPLACIAN.values(), self._arguments))
+
+    @property
+    def options(self):
+        """Options of the default method."""
+        return default_options(chosen(LAPLACIAN.values(), self._arguments))
 
     def named(self, setting):
         """Return the option of a setting."""

@@ -18,7 +18,6 @@ from .measures import (
     volumes_over,
 )
 from .mesh_verb import Mesh
-from .moving_verbs import MinimalSurface
 from .reference_verbs import Align, Compare, ReferenceVerb, TransferAttributes
 from .result_verbs import Orient
 from .results import number_text
@@ -33,7 +32,7 @@ from .tool_verb import declared_verbs
 
 def make_verbs() -> list:
     """Return new verbs of all kinds: those on surfaces, those on points, and those that need no object."""
-    others = Measure, Section, Profile, Orient, MinimalSurface, Mesh, Simulate, Align, Compare, TransferAttributes
+    others = Measure, Section, Profile, Orient, Mesh, Simulate, Align, Compare, TransferAttributes
     return [Analyze(), *declared_verbs(), *(verb() for verb in others), *without_object()]
 
 

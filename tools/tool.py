@@ -15,8 +15,14 @@ from .settings import Setting
 Laplacian: TypeAlias = "core.LaplaceBeltrami"
 Array = NDArray[Any]
 Progress = Callable[[str, float], None]
-Length = Callable[[float], str]  # which writes a length as a text
 Subject = TypeVar("Subject")
+
+
+class Length(Protocol):
+    """A function that writes a length as a text; with a power of 2 an area, with 3 a volume."""
+
+    def __call__(self, size: float, power: int = 1) -> str:
+        """Return the text."""
 
 
 class Row(NamedTuple):
@@ -38,6 +44,8 @@ class Cloud(Protocol):
     out: Array  # (m,) int, floaters among splats that operators leave out
     repeats: bool  # whether settings are adjusted, which must not take long
     points: Array  # (n, 3), with lengths as the results have them
+    boundary: Array | None  # (n,) bool, points of the boundary, where a group names them
+    options: core.LaplacianOptions  # of the default method, where the paper's operator is not usable
 
     def named(self, setting: str) -> str:
         """Return what a setting is called there, for errors."""
@@ -73,6 +81,8 @@ class Outcome(NamedTuple):
         Where the points are moved to, in the coordinates of `Cloud.points`.
     kept : ndarray, (n,) bool, optional
         Which points stay; the others are deleted.
+    numbers : mapping of str to ndarray
+        Results that are not at the points, by name.
     """
 
     values: Mapping[str, Array]
@@ -80,6 +90,7 @@ class Outcome(NamedTuple):
     notices: Sequence[str] = ()
     points: Array | None = None
     kept: Array | None = None
+    numbers: Mapping[str, Array] = {}
 
 
 class AnyTool(Generic[Subject]):

@@ -153,21 +153,17 @@ def same_lengths(before, now) -> bool:
     return np.allclose(before, now, rtol=0.0, atol=1e-5 * np.abs(now).max())
 
 
+def length_text(size: float, power: int = 1) -> str:
+    """Write a length in the units of the scene; with a power of 2 an area, with 3 a volume."""
+    units, kind = bpy.context.scene.unit_settings, ("LENGTH", "AREA", "VOLUME")[power - 1]
+    return bpy.utils.units.to_string(units.system, kind, size * units.scale_length**power, precision=_DIGITS).strip()
+
+
 def area_text(area: float) -> str:
     """Write an area in the units of the scene."""
-    return _in_units("AREA", area, 2)
-
-
-def length_text(length: float) -> str:
-    """Write a length in the units of the scene."""
-    return _in_units("LENGTH", length, 1)
+    return length_text(area, 2)
 
 
 def volume_text(volume: float) -> str:
     """Write a volume in the units of the scene."""
-    return _in_units("VOLUME", volume, 3)
-
-
-def _in_units(kind, value, power):
-    units = bpy.context.scene.unit_settings
-    return bpy.utils.units.to_string(units.system, kind, value * units.scale_length**power, precision=_DIGITS).strip()
+    return length_text(volume, 3)

@@ -13,6 +13,7 @@ from ..objects.attributes import read_attribute, remove_numbered, tag_changed, w
 from ..objects.curves import read_curve
 from ..objects.deleting import check_deletable, keep_points
 from ..objects.groups import chosen_weights, group_kind, has_group
+from ..objects.options import default_options
 from ..objects.positions import check_movable, target_property, write_positions
 from ..objects.properties import properties_of, values_of
 from ..objects.reading import read_points
@@ -40,6 +41,7 @@ class ObjectCloud:
         self.name, self.where, self.kind = obj.name, f'"{obj.name}"', group_kind(obj)
         self.points, self.out = reading.points, cache.floating(reading.splats)
         self.repeats = operator.is_repeated(context)
+        self.boundary, self.options = reading.boundary, default_options(obj.meshfree)
 
     def named(self, setting):
         """Return the label of a setting."""
@@ -124,6 +126,7 @@ class Declared(Tool):
                 values = reading.local_normals(values)
             write_attribute(obj.data, name, values)
         tag_changed(obj.data)
+        _write_numbers(obj, outcome)
         return [f"{obj.name}: {text}" for text in (*outcome.notices, outcome.line)]
 
 
@@ -185,12 +188,21 @@ class Moving(Declared):
     def write(self, context, obj, result):
         found, laplacian, own, reading, gradients, discs = result
         outcome = self.tool.finish(found, laplacian, own, length_text)
-        title = self.tool.title(found)
-        self.put(context, write_positions(obj, reading, outcome.points, self.goal, title, gradients, discs))
+        if outcome.points is not None:
+            title = self.tool.title(found)
+            self.put(context, write_positions(obj, reading, outcome.points, self.goal, title, gradients, discs))
+        _write_numbers(obj, outcome)
         return [f"{obj.name}: {text}" for text in (*outcome.notices, outcome.line)]
 
     def put(self, context, key):
         """Finish with the shape key that holds the result, if there is one."""
+
+
+def _write_numbers(obj, outcome):
+    """Write results that are not at the points to an object."""
+    for name, values in outcome.numbers.items():
+        # As a list: Blender writes an array into the memory of the one before, whatever the length of that.
+        obj[name] = values.tolist()
 
 
 def operator_of(tool, *mixins):

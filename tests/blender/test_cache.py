@@ -1,6 +1,7 @@
 """Results that are kept: what is only shown in another way is not computed again, and memory has a bound."""
 
 from threading import Thread
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -166,16 +167,15 @@ def test_a_field_between_other_values_is_solved_once(cache, calls, core):
 
 @pytest.mark.any_blender
 def test_a_film_that_was_stopped_is_not_kept(cache, core):
-    minimal = part("command.minimal")
-    points = wave()
-    boundary = core.build_laplacian(points).boundary
+    minimal = part("tools.minimal_surface")
+    laplacian, own = core.build_laplacian(wave()), SimpleNamespace(tolerance=0.0, steps=4)
 
     def stop_later(stage, fraction):
         if fraction > 0.5:
             raise core.Cancelled
 
     with pytest.raises(core.Cancelled):
-        minimal.shrink(points, boundary, 0.0, 4, options(), stop_later)
+        minimal.TOOL.compute(laplacian, (None, options(), "wave", "column"), own, stop_later)
 
 
 def options():
