@@ -11,6 +11,7 @@ class CloudVerb(Verb):
     """A verb for clouds, with options for how they are read; `work` of a subclass processes one."""
 
     settings = ()  # its own
+    read_notices = ()  # of what was read once, before the first input
     bytes_a_point = 200  # of memory at the peak, but for operators, which are checked where they are built
 
     @property
@@ -70,6 +71,10 @@ class SurfaceVerb(CloudVerb):
         for setting in LAPLACIAN.values():
             add_setting(parser, setting)
 
+    def laplacian(self, cloud, arguments, progress):
+        """Return the operator of a cloud by the settings of arguments."""
+        return self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress).laplacian
+
     def build(self, cloud, values, progress):
         """Return the operator of a cloud, by the values of the settings in `LAPLACIAN`."""
         boundary = boundary_of(cloud, values)
@@ -85,5 +90,5 @@ def boundary_of(cloud, values):
 
 
 def floaters(arguments) -> bool:
-    """Whether floaters among splats are left out."""
-    return chosen([LAPLACIAN["leave_out_floaters"]], arguments)["leave_out_floaters"]
+    """Whether floaters among splats are left out: always where no option asks."""
+    return getattr(arguments, "leave_out_floaters", None) is not False

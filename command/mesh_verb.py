@@ -1,22 +1,15 @@
-"""The verb that makes a mesh of a cloud."""
+"""The subcommand that makes a mesh of a cloud."""
 
 import argparse
 
 import numpy as np
 
 from . import clouds, colors, core
-from .cloud_verb import SurfaceVerb, floaters
-from .meshing import MESH, close_gaps
-from .settings import LAPLACIAN, chosen
+from .tool_verb import ToolVerb
 
 
-class Mesh(SurfaceVerb):
-    """The verb `mesh`, whose outputs are files of meshes."""
-
-    name = "mesh"
-    help = "reconstruct a mesh from the points, with their columns and colors on its vertices"
-    settings = tuple(MESH.values())
-    operator = "mesh_surface"
+class MeshVerb(ToolVerb):
+    """The subcommand of the tool that makes a mesh, whose outputs are files of meshes."""
 
     @property
     def outputs(self):
@@ -29,23 +22,20 @@ class Mesh(SurfaceVerb):
             told = "end the mesh where the points end; otherwise all openings are closed (default on)"
             parser.add_argument("--keep-open", action=argparse.BooleanOptionalAction, default=True, help=told)
 
-    def work(self, path, given, arguments, output, progress):
-        cloud = clouds.Cloud(path, given, floaters(arguments))
-        laplacian = self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress).laplacian
-        mesh = core.surface.mesh_surface(laplacian, **chosen(self.settings, arguments), progress=progress)
-        closed, opened = close_gaps(mesh.faces)
-        faces, written = [mesh.faces, closed], []
-        for kind in clouds.kinds().values() if opened else ():
+    def compute(self, cloud, laplacian, inputs, own, arguments, progress):
+        found = super().compute(cloud, laplacian, inputs, own, arguments, progress)
+        for kind in clouds.kinds().values() if found.opened else ():
             if not arguments.keep_open:
-                faces, opened = kind.close(mesh.vertices, faces)
-        if output is not None:
-            table = _on_vertices(cloud, laplacian, mesh.vertices)
-            if clouds.kind_of(output) is not None:
-                given.owner.add_mesh(table, faces)
-            else:
-                written = core.files.write_mesh(output, table, faces, double=not table.single)
-        figures = {"vertices": len(mesh.vertices), "faces": sum(map(len, faces)), "open_edges": opened}
-        return {"points": len(cloud.points), **figures}, [*laplacian.notices, *mesh.notices, *written]
+                faces, opened = kind.close(found.mesh.vertices, found.faces)
+                found = found._replace(faces=faces, opened=opened)
+        return found
+
+    def write(self, output, cloud, outcome, laplacian, arguments):
+        faces, table = outcome.made.faces, _on_vertices(cloud, laplacian, outcome.made.mesh.vertices)
+        if clouds.kind_of(output) is None:
+            return core.files.write_mesh(output, table, faces, double=not table.single)
+        cloud.owner.add_mesh(table, faces)
+        return []
 
 
 def _on_vertices(cloud, laplacian, vertices):

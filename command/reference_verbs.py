@@ -6,24 +6,28 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from . import alignment, clouds, colors, comparison, core, quantities, transferring
+from . import clouds, colors, quantities, transferring
 from .cloud_verb import CloudVerb, SurfaceVerb, boundary_of, floaters
+from .measures import add_base, base_of, check_base, volumes_over
 from .naming import naming
 from .results import number_text
-from .settings import LAPLACIAN, chosen
+from .rows import TABLES, write_rows
+from .settings import chosen
+from .tool_verb import PointVerb, ToolVerb
 
 
 class WithReference(CloudVerb):
     """A verb with another file, which is read once, before the first input."""
 
     reads = ("reference",)
-    use = ""  # what the reference is for, for the help
+    use = ""  # what the reference is for, for the help, if no tool tells it
     required = True  # whether there must be one
     _own = _target = None  # arguments with the settings of the reference, and its cloud
 
     def add_options(self, parser):
+        use = self.use or self.tool.reference
         parser.add_argument(
-            "--reference", required=self.required, metavar="FILE", help=f"{self.use}, of the kinds of inputs"
+            "--reference", required=self.required, metavar="FILE", help=f"{use}, of the kinds of inputs"
         )
         for ending in clouds.kinds():
             parser.add_argument(
@@ -44,34 +48,21 @@ class WithReference(CloudVerb):
         """Return the cloud of the reference, with all that is read of it."""
         return clouds.Cloud(path, given)
 
+    @property
+    def read_notices(self):
+        """What was told as the reference was read, if there is one."""
+        return [] if self._target is None else self._target.notices
 
-class Align(WithReference):
-    """The verb `align`, whose outputs are in the coordinates of the reference."""
+    def reference(self):
+        """Return the cloud of the reference, and arguments with its settings."""
+        return self._target, self._own
 
-    name = "align"
-    help = "move points onto the surface of those of another file, from nearby"
-    bytes_a_point = 500
-    settings = tuple(alignment.ALIGN.values())
-    operator = "align_points"  # which writes the same result in Blender
-    use = "point cloud that the points are moved onto"
-
-    def work(self, path, given, arguments, output, progress):
-        reference = Path(arguments.reference)
-        cloud, target = clouds.Cloud(path, given), self._target
-        shift = cloud.place - target.place
-        found = core.measure.align(
-            cloud.points + shift, target.points, **chosen(self.settings, arguments), progress=progress
-        )
-        alignment.check_found(found, path.stem, reference.stem)
-        written = []
-        if output is not None:
-            [residual] = quantities.written_by(self.operator)
-            moved = clouds.moved(given, cloud.points + shift, found.matrix, target.place)
-            written = clouds.write(output, moved, {residual: found.residual})
-        half = f"half of them within {alignment.middle(found):.4g}"
-        line = f"{path.stem}: {found.overlap:.0%} of the points lie on {reference.name}, {half}"
-        figures = {"points": len(cloud.points), "done": line, **alignment.figures(found, target.place)}
-        return figures, [*target.notices, *alignment.doubts(found), *written]
+    def write(self, output, cloud, outcome, subject, arguments):
+        given, target = cloud.given, self._target
+        if outcome.matrix is not None:
+            shifted = cloud.points + (cloud.place - target.place)
+            given = clouds.moved(given, shifted, outcome.matrix, target.place)
+        return clouds.write(output, given, outcome.values)
 
 
 class ReferenceVerb(WithReference, SurfaceVerb):
@@ -84,52 +75,47 @@ class ReferenceVerb(WithReference, SurfaceVerb):
         boundary_of(cloud, vars(self._own))
         return cloud
 
-    @property
-    def read_notices(self) -> list:
-        """What was told as the reference was read, if there is one."""
-        return [] if self._target is None else self._target.notices
-
-    def reference(self, progress):
-        """Return the cloud of the reference, and its operator."""
+    def laplacian(self, cloud, arguments, progress):
+        if cloud is not self._target:
+            return super().laplacian(cloud, arguments, progress)
         if self._laplacian is None:
-            with naming(self._target.path):
-                values = chosen(LAPLACIAN.values(), self._own)
-                self._laplacian = self.build(self._target, values, progress).laplacian
-        return self._target, self._laplacian
+            with naming(cloud.path):
+                self._laplacian = super().laplacian(cloud, arguments, progress)
+        return self._laplacian
 
 
-class Compare(ReferenceVerb):
-    """The verb `compare`."""
+class AlignVerb(WithReference, PointVerb):
+    """The subcommand of the tool that moves points onto the surface of others."""
 
-    name = operator = "compare"
-    help = "distance of points from the surface of those of another file, along normals or the nearest one"
-    settings = tuple(comparison.COMPARE.values())
-    use = "point cloud from whose surface distances are measured"
 
-    def work(self, path, given, arguments, output, progress):
-        (target, laplacian), reference = self.reference(progress), Path(arguments.reference)
-        cloud, values = clouds.Cloud(path, given, floaters(arguments)), chosen(LAPLACIAN.values(), arguments)
-        own, shift = SimpleNamespace(**chosen(self.settings, arguments)), cloud.place - target.place
+class CompareVerb(ReferenceVerb, PointVerb):
+    """The subcommand of the tool that measures distances from the surface of another cloud."""
 
-        def build(progress):
-            return comparison.Sided(
-                self.build(cloud, values, progress).laplacian, cloud.columns.get(quantities.ORIENTATION)
-            )
 
-        other = comparison.Sided(laplacian, target.columns.get(quantities.ORIENTATION))
-        names = path.stem, reference.name
-        found, aligned, told = comparison.compared(
-            cloud.points + shift, build, lambda _: other, own, names, "", progress
-        )
-        told = [*target.notices, *([] if aligned is None else alignment.doubts(aligned)), *told]
-        if output is not None:
-            moved = given
-            if aligned is not None:
-                moved = clouds.moved(given, cloud.points + shift, aligned.matrix, target.place)
-            [deviation] = quantities.written_by(self.operator)
-            told += clouds.write(output, moved, {deviation: found.distance, quantities.COMPARED: found.known})
-        line = comparison.line(found, path.stem, reference.name, number_text)
-        return {"points": len(cloud.points), "done": line, **comparison.figures(found)}, told
+class MeasureVerb(ReferenceVerb, ToolVerb):
+    """The subcommand of the tool that measures parts, here also over planes and clouds, whose outputs are tables."""
+
+    outputs, prints_all, required = TABLES, True, False
+
+    def add_options(self, parser):
+        add_base(parser)
+        super().add_options(parser)
+
+    def check(self, parser, arguments):
+        check_base(parser, arguments)
+
+    def compute(self, cloud, laplacian, inputs, own, arguments, progress):
+        found, ground = super().compute(cloud, laplacian, inputs, own, arguments, progress), ()
+        if self._target is not None:
+            operator = self.laplacian(*self.reference(), progress)
+            ground = (lambda _: operator), self._target.place, self._target.path.name
+        base = base_of(arguments.plane, arguments.normal, cloud.place, *ground)
+        beside, told = volumes_over(laplacian, found.rows, inputs[0], base, progress)
+        return found._replace(beside=beside, notices=[*found.notices, *told])
+
+    def write(self, output, cloud, outcome, laplacian, arguments):
+        write_rows(output, outcome.figures["parts"])
+        return []
 
 
 class TransferAttributes(ReferenceVerb):
@@ -141,11 +127,11 @@ class TransferAttributes(ReferenceVerb):
     use = "points whose attributes are taken"
 
     def work(self, path, given, arguments, output, progress):
-        target, laplacian = self.reference(progress)
+        target, laplacian = self._target, self.laplacian(*self.reference(), progress)
         own, reference = SimpleNamespace(**chosen(self.settings, arguments)), arguments.reference
         arrays, left_out = _values(target, own)
-        cloud, values = clouds.Cloud(path, given, floaters(arguments)), chosen(LAPLACIAN.values(), arguments)
-        built = self.build(cloud, values, progress).laplacian
+        cloud = clouds.Cloud(path, given, floaters(arguments))
+        built = self.laplacian(cloud, arguments, progress)
         offsets = [target.place - cloud.place]
         match = transferring.matched(built, [laplacian], offsets, own, path.stem, [reference], progress)
         smooth = [name for name, column in arrays.items() if _is_smooth(name, column)]

@@ -1,53 +1,21 @@
-"""Verbs that cut and measure along lines, whose outputs are tables."""
+"""The subcommands of tools that cut and measure along lines, whose outputs are tables."""
 
-from types import SimpleNamespace
+import numpy as np
 
-from . import clouds, profiles, sections, uncached
-from .cloud_verb import SurfaceVerb, floaters
+from . import clouds, core, tools
 from .inputs import check_beside
-from .measures import check_numbers
-from .results import number_text
+from .measures import add_normal
 from .rows import TABLES, write_rows, write_text
-from .settings import LAPLACIAN, chosen
+from .settings import place
 from .svg import profile_picture
+from .tool_verb import ToolVerb
 from .units import NO_UNITS
 
-
-class CutOptions:
-    """The options of a verb that cuts, for what else is written; beside those of `sections.add_options`."""
-
-    def check(self, parser, arguments):
-        """Refuse curves without an output beside which they are written."""
-        check_beside(parser, arguments, "curves")
-
-    def beside(self, output, arguments):
-        """Return the path of the corners of the curves, if these are wanted."""
-        return [sections.corners_path(output)] if arguments.curves else []
+_CURVES = "curve,closed,x,y,z", ["%d", "%d", "%.17g", "%.17g", "%.17g"]  # columns of a file of corners, and their form
 
 
-class PathOptions:
-    """The options of a verb that measures along a path."""
-
-    def add_options(self, parser):
-        """Add both ends of the path, and the picture."""
-        profiles.add_options(parser)
-        super().add_options(parser)
-
-    def check(self, parser, arguments):
-        """Refuse a picture without an output beside which it is written."""
-        check_beside(parser, arguments, "svg")
-
-    def beside(self, output, arguments):
-        """Return the path of the picture, if it is wanted."""
-        return [profiles.picture_path(output)] if arguments.svg else []
-
-
-class Section(CutOptions, SurfaceVerb):
-    """The verb `section`."""
-
-    name = "section"
-    help = "cut the surface by a plane: curves, with their length and the area that they enclose"
-    operator = "cross_section"
+class SectionVerb(ToolVerb):
+    """The subcommand of the tool that cuts, whose outputs are tables of the curves."""
 
     @property
     def outputs(self):
@@ -63,70 +31,87 @@ class Section(CutOptions, SurfaceVerb):
             help=f"position of the plane in the coordinates of the file, as --plane=X,Y,Z where X is below zero{named}."
             " Without it, the middle of the points",
         )
-        sections.add_options(parser)
+        add_normal(parser)
+        parser.add_argument(
+            "--curves", action="store_true", help="write the corners of the curves, too, beside the output: _curves.csv"
+        )
         super().add_options(parser)
 
     def check(self, parser, arguments):
         if arguments.normal is not None and isinstance(arguments.plane, str):
             parser.error("--normal goes with a position, not with an object, whose plane has one")
-        super().check(parser, arguments)
+        check_beside(parser, arguments, "curves")
 
-    def work(self, path, given, arguments, output, progress):
-        cloud, name = clouds.Cloud(path, given, floaters(arguments)), path.stem
-        laplacian = self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress).laplacian
-        guessed, position = [], sections.middle(cloud.points)
-        normal = sections.UP if arguments.normal is None else arguments.normal
-        if arguments.plane is None:
-            guessed = [sections.through_middle(name)]
-        elif isinstance(arguments.plane, str):
+    def beside(self, output, arguments):
+        return [output.with_name(f"{output.stem}_curves.csv")] if arguments.curves else []
+
+    def inputs(self, cloud, arguments):
+        (position, normal, told, name), own = super().inputs(cloud, arguments)
+        normal = normal if arguments.normal is None else arguments.normal
+        if isinstance(arguments.plane, str):
             position, normal = cloud.owner.plane(arguments.plane)
-            position = position - cloud.place
+            position, told = position - cloud.place, ()
+        elif arguments.plane is not None:
+            position, told = arguments.plane - cloud.place, ()
+        return (position, normal, told, name), own
+
+    def write(self, output, cloud, outcome, laplacian, arguments):
+        curves = [(curve.points + cloud.place, curve.closed) for curve in outcome.made]
+        if clouds.kind_of(output) is not None:
+            cloud.owner.add_curves(curves)
         else:
-            position = arguments.plane - cloud.place
-        found = sections.cut(laplacian, position, normal, name, progress)
-        if output is not None:
-            if clouds.kind_of(output) is not None:
-                given.owner.add_curves([(curve.points + cloud.place, curve.closed) for curve in found.curves])
-            else:
-                write_rows(output, sections.curve_records(found))
-            for corners in self.beside(output, arguments):
-                sections.write_corners(corners, found.curves, cloud.place)
-        line = sections.section_line(found, name, number_text, number_text)
-        figures = {"points": len(cloud.points), "done": line, **sections.figures(found)}
-        return figures, [*laplacian.notices, *guessed, *found.notices]
+            write_rows(output, tools.cross_section.records(outcome.made))
+        for path in self.beside(output, arguments):
+            _write_corners(path, curves)
+        return []
 
 
-class Profile(PathOptions, SurfaceVerb):
-    """The verb `profile`."""
+def _write_corners(path, curves):
+    """Write the corners of curves."""
+    columns = [
+        np.column_stack([np.full((len(points), 2), (number, closed)), points])
+        for number, (points, closed) in enumerate(curves, 1)
+    ]
+    with core.files.replacing(path) as part:
+        np.savetxt(part, np.concatenate(columns), _CURVES[1], ",", header=_CURVES[0], comments="")
 
-    name = "profile"
-    help = "measure the height or a column along the shortest path between two positions, as a table"
-    settings = tuple(profiles.PROFILE.values())
+
+class ProfileVerb(ToolVerb):
+    """The subcommand of the tool that measures along a path, whose outputs are tables."""
 
     @property
     def outputs(self):
         """Endings of files."""
         return (".csv", *clouds.kinds())
 
-    def work(self, path, given, arguments, output, progress):
-        cloud, name = clouds.Cloud(path, given, floaters(arguments)), path.stem
-        own, values = SimpleNamespace(**chosen(self.settings, arguments)), None
-        if own.source:
-            values = cloud.numbers(own.source, "--source")
-            check_numbers(values, own.source, str(path))
-            profiles.check_varying(values.dtype.kind == "f", own.source, str(path))
-        ends = profiles.nearest_ends(cloud.points + cloud.place, [arguments.path_from, arguments.path_to])
-        laplacian = self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress).laplacian
-        corners = profiles.path_between(laplacian, ends.rows, uncached, progress)
-        found = profiles.measured(laplacian, corners, values, own, cloud.place, cloud.place)
-        if output is not None:
-            table = profiles.table(found.columns, own.source)
-            if clouds.kind_of(output) is not None:
-                given.owner.add_profile(found.distance, found.values, table)
-            else:
-                write_text(output, table)
-            for picture in self.beside(output, arguments):
-                write_text(picture, profile_picture(table, NO_UNITS))
-        line = profiles.profile_line(found, own, name, number_text)
-        figures = {"points": len(cloud.points), "done": line, **profiles.figures(found), **ends.figures}
-        return figures, [*laplacian.notices, *profiles.missing(found, name)]
+    def add_options(self, parser):
+        for option, what in (("from", "begins"), ("to", "ends")):
+            parser.add_argument(
+                f"--{option}",
+                dest=f"path_{option}",
+                type=place,
+                required=True,
+                metavar="X,Y,Z",
+                help=f"position in the coordinates of the file, at whose nearest point the path {what}; as"
+                f" --{option}=X,Y,Z where X is below zero",
+            )
+        parser.add_argument(
+            "--svg", action="store_true", help="write a small picture, too, beside the output with the ending .svg"
+        )
+        super().add_options(parser)
+
+    def check(self, parser, arguments):
+        check_beside(parser, arguments, "svg")
+
+    def beside(self, output, arguments):
+        return [output.with_suffix(".svg")] if arguments.svg else []
+
+    def write(self, output, cloud, outcome, laplacian, arguments):
+        found, table = outcome.made
+        if clouds.kind_of(output) is not None:
+            cloud.owner.add_profile(found.distance, found.values, table)
+        else:
+            write_text(output, table)
+        for path in self.beside(output, arguments):
+            write_text(path, profile_picture(table, NO_UNITS))
+        return []

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from . import clouds, core, tools
+from . import clouds, core, quantities, tools
 from .cloud_verb import CloudVerb, SurfaceVerb, boundary_of, floaters
 from .groups import add_at, check_sources, read_sources, read_weights
 from .results import number_text
@@ -18,9 +18,9 @@ class _Declared:
 
     def __init__(self, tool):
         self.tool, self.settings = tool, tool.settings
-        self.name, self.operator = tool.name.replace("_", "-"), tool.name
+        self.name, self.operator = tool.verb or tool.name.replace("_", "-"), tool.name
         self.help = tool.help[0].lower() + tool.help[1:]
-        self.reads = ("curve",) if "curve" in tool.reads else ()
+        self.reads = (*self.reads, *(("curve",) if "curve" in tool.reads else ()))
 
     def add_options(self, parser):
         if "sources" in self.tool.reads:
@@ -43,20 +43,31 @@ class _Declared:
     def inputs(self, cloud, arguments):
         """Return what the tool takes beside the points, and the values of its settings as attributes."""
         own = SimpleNamespace(**chosen(self.settings, arguments))
-        return self.tool.inputs(FileCloud(cloud, arguments), own), own
+        return self.tool.inputs(FileCloud(cloud, arguments, self, cloud.path.stem), own), own
 
-    def written(self, cloud, found, subject, own, output):
+    def compute(self, cloud, subject, inputs, own, arguments, progress):
+        """Compute what takes long."""
+        return self.tool.compute(subject, inputs, own, progress)
+
+    def written(self, cloud, found, subject, own, output, arguments):
         """Write what a tool found, and return what to print, and notices."""
         outcome = self.tool.finish(found, subject, own, number_text)
-        notices, count, given, values = list(outcome.notices), len(cloud.points), cloud.given, outcome.values
+        notices, count = [*self.read_notices, *outcome.notices], len(cloud.points)
         if outcome.kept is not None:
-            count, given = int(np.count_nonzero(outcome.kept)), cloud.taken(outcome.kept)
-            values = {name: each[outcome.kept] for name, each in values.items()}
-        elif outcome.points is not None and output is not None:
-            given = _moved(cloud, outcome.points, subject)
+            count = int(np.count_nonzero(outcome.kept))
         if output is not None:
-            notices += clouds.write(output, given, values, numbers=outcome.numbers)
-        return {"points": count, "done": f"{cloud.path.stem}: {outcome.line}"}, notices
+            notices += self.write(output, cloud, outcome, subject, arguments)
+        return {"points": count, "done": f"{cloud.path.stem}: {outcome.line}", **outcome.figures}, notices
+
+    def write(self, output, cloud, outcome, subject, arguments):
+        """Write an outcome, and return notices."""
+        given, values = cloud.given, outcome.values
+        if outcome.kept is not None:
+            given = cloud.taken(outcome.kept)
+            values = {name: each[outcome.kept] for name, each in values.items()}
+        elif outcome.points is not None:
+            given = _moved(cloud, outcome.points, subject)
+        return clouds.write(output, given, values, numbers=outcome.numbers)
 
 
 class ToolVerb(_Declared, SurfaceVerb):
@@ -65,9 +76,9 @@ class ToolVerb(_Declared, SurfaceVerb):
     def work(self, path, given, arguments, output, progress):
         cloud = clouds.Cloud(path, given, floaters(arguments))
         inputs, own = self.inputs(cloud, arguments)
-        laplacian = self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress).laplacian
-        found = self.tool.compute(laplacian, inputs, own, progress)
-        figures, notices = self.written(cloud, found, laplacian, own, output)
+        laplacian = self.laplacian(cloud, arguments, progress)
+        found = self.compute(cloud, laplacian, inputs, own, arguments, progress)
+        figures, notices = self.written(cloud, found, laplacian, own, output, arguments)
         return figures, [*dict.fromkeys([*laplacian.notices, *notices])]
 
 
@@ -80,10 +91,10 @@ class PointVerb(_Declared, CloudVerb):
         return self.tool.bytes_a_point
 
     def work(self, path, given, arguments, output, progress):
-        cloud = clouds.Cloud(path, given)
+        cloud = clouds.Cloud(path, given, floaters(arguments))
         inputs, own = self.inputs(cloud, arguments)
-        found = self.tool.compute(cloud.points, inputs, own, progress)
-        return self.written(cloud, found, cloud.points, own, output)
+        found = self.compute(cloud, cloud.points, inputs, own, arguments, progress)
+        return self.written(cloud, found, cloud.points, own, output, arguments)
 
 
 def _moved(cloud, points, laplacian):
@@ -94,10 +105,11 @@ def _moved(cloud, points, laplacian):
     return replace(given, points=given.points + moved)  # so that points that stay keep all of their digits
 
 
-def declared_verbs() -> list:
-    """Return the subcommands of all declared tools."""
+def declared_verbs(own) -> list:
+    """Return the subcommands of all declared tools, some of classes of their own, by the names of the tools."""
     declared = tools.listed.listed_tools()
-    return [(PointVerb if isinstance(tool, tools.tool.PointTool) else ToolVerb)(tool) for tool in declared]
+    usual = [PointVerb if isinstance(tool, tools.tool.PointTool) else ToolVerb for tool in declared]
+    return [own.get(tool.name, verb)(tool) for tool, verb in zip(declared, usual, strict=True)]
 
 
 class FileCloud:
@@ -105,10 +117,12 @@ class FileCloud:
 
     kind, in_blender, repeats = "column", False, False
 
-    def __init__(self, cloud, arguments):
-        self._cloud, self._arguments = cloud, arguments
-        self.name, self.where = cloud.path.stem, str(cloud.path)
+    def __init__(self, cloud, arguments, verb, name):
+        self._cloud, self._arguments, self._verb = cloud, arguments, verb
+        self.name, self.where = name, str(cloud.path)
         self.points, self.out = cloud.points, cloud.out
+        self.place = self.heights_from = cloud.place
+        self.orientation = cloud.columns.get(quantities.ORIENTATION)
 
     @property
     def boundary(self):
@@ -127,6 +141,10 @@ class FileCloud:
     def has_group(self, name):
         """Whether there is a group or a column of some name."""
         return self._cloud.has(name)
+
+    def has_numbers(self, name):
+        """Whether there is a column of some name."""
+        return name in self._cloud.columns
 
     def weights(self, setting, name, least=1, outside=0.0):
         """Return the weights in the group or column that a setting names, (n,)."""
@@ -148,3 +166,20 @@ class FileCloud:
         else:
             places = core.files.read_points(curve).points
         return places - self._cloud.place, closed
+
+    def ends(self):
+        """Return the points nearest to two given positions, (2,) int, and how far they are from these, (2,)."""
+        points, places = self.points + self.place, [self._arguments.path_from, self._arguments.path_to]
+        rows = core.geometry.nearest_rows(points, places)
+        if rows[0] == rows[1]:
+            raise core.PointCloudError("The same point is the nearest one to both ends of the path. Give others.")
+        return rows, np.linalg.norm(points[rows] - places, axis=1)
+
+    def laplacian(self, progress):
+        """Return the operator."""
+        return self._verb.laplacian(self._cloud, self._arguments, progress)
+
+    def reference(self):
+        """Return the cloud of the other file, and the offset of its points."""
+        cloud, arguments = self._verb.reference()
+        return FileCloud(cloud, arguments, self._verb, cloud.path.name), self.place - cloud.place

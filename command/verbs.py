@@ -1,39 +1,33 @@
 """The verbs that need no Blender."""
 
-from types import SimpleNamespace
-
 from . import analysis, clouds, core, quantities
 from .analysis import WRITE_LIMIT
 from .bending import Deform, SplatInfo
 from .cloud_verb import CloudVerb, SurfaceVerb, floaters
-from .measures import (
-    OVER,
-    add_base,
-    base_of,
-    check_base,
-    check_labels,
-    check_numbers,
-    measured_line,
-    part_table,
-    volumes_over,
-)
-from .mesh_verb import Mesh
-from .reference_verbs import Align, Compare, ReferenceVerb, TransferAttributes
+from .mesh_verb import MeshVerb
+from .reference_verbs import AlignVerb, CompareVerb, MeasureVerb, TransferAttributes
 from .result_verbs import Orient
-from .results import number_text
-from .rows import TABLES, write_rows
 from .settings import LAPLACIAN, Setting, chosen
 from .source_verbs import Simulate
 from .summary import Report
-from .table_verbs import Profile, Section
+from .table_verbs import ProfileVerb, SectionVerb
 from .tile_verbs import TilesAgree, TilesCut, TilesMeasure, TilesModes, TilesReport, TilesRun, TilesSurvey
 from .tool_verb import declared_verbs
+
+_DECLARED = {
+    "align_points": AlignVerb,
+    "compare": CompareVerb,
+    "cross_section": SectionVerb,
+    "measure_parts": MeasureVerb,
+    "mesh_surface": MeshVerb,
+    "profile": ProfileVerb,
+}
 
 
 def make_verbs() -> list:
     """Return new verbs of all kinds: those on surfaces, those on points, and those that need no object."""
-    others = Measure, Section, Profile, Orient, Mesh, Simulate, Align, Compare, TransferAttributes
-    return [Analyze(), *declared_verbs(), *(verb() for verb in others), *without_object()]
+    others = Orient, Simulate, TransferAttributes
+    return [Analyze(), *declared_verbs(_DECLARED), *(verb() for verb in others), *without_object()]
 
 
 def without_object() -> list:
@@ -142,51 +136,3 @@ class Analyze(Frames, SurfaceVerb):
             everything = analysis.arrays(cloud.place, built, spectrum) if output.suffix.lower() == ".npz" else None
             written = clouds.write(output, given, {**measures, **modes}, everything, numbers)
         return {**analysis.figures(measures, spectrum), **matched}, [*built.notices, *notices, *written]
-
-
-class Measure(ReferenceVerb):
-    """The verb `measure`, whose outputs are tables."""
-
-    name, operator = "measure", "measure_parts"
-    help = "measure every component and segment: points, area, boundary, volume, and the mean of a column"
-    outputs = TABLES
-    prints_all = True
-    settings = (
-        Setting("volume", "Measure the volume within closed components, too. It takes longer", True),
-        Setting("source", "Numbers at the points whose mean is wanted; empty for the roughness, if there is one", ""),
-    )
-    use, required = OVER, False
-
-    def add_options(self, parser):
-        add_base(parser)
-        super().add_options(parser)
-
-    def check(self, parser, arguments):
-        check_base(parser, arguments)
-        super().check(parser, arguments)
-
-    def work(self, path, given, arguments, output, progress):
-        cloud, own = clouds.Cloud(path, given, floaters(arguments)), SimpleNamespace(**chosen(self.settings, arguments))
-        labels, [roughness] = cloud.columns.get(quantities.SEGMENT), quantities.written_by("roughness")
-        if labels is not None:
-            check_labels(labels, quantities.SEGMENT, str(path))
-        name = own.source or (roughness if roughness in cloud.columns else "")
-        values = cloud.numbers(name, "--source") if name else None
-        if values is not None:
-            check_numbers(values, name, str(path))
-        laplacian = self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress).laplacian
-        rows, notices = part_table(laplacian, labels, values, own.volume, progress)
-        base = base_of(arguments.plane, arguments.normal, cloud.place, *self._ground(arguments, progress))
-        volumes, told = volumes_over(laplacian, rows, labels, base, progress)
-        records = [row.record() | over for row, over in zip(rows, volumes, strict=True)]
-        if output is not None:
-            write_rows(output, records)
-        line = measured_line(rows, path.stem, number_text)
-        return {"points": len(cloud.points), "done": line, "parts": records}, [*notices, *self.read_notices, *told]
-
-    def _ground(self, arguments, progress):
-        """Return what `base_of` takes of the other cloud, if there is one."""
-        if arguments.reference is None:
-            return ()
-        target, laplacian = self.reference(progress)
-        return lambda _: laplacian, target.place, target.path.name

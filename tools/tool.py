@@ -46,12 +46,18 @@ class Cloud(Protocol):
     points: Array  # (n, 3), with lengths as the results have them
     boundary: Array | None  # (n,) bool, points of the boundary, where a group names them
     options: core.LaplacianOptions  # of the default method, where the paper's operator is not usable
+    place: Array  # (3,), less which the points are
+    heights_from: Array  # (3,), the same where heights are told, which in Blender are those in the scene
+    orientation: Array | None  # (n, 3), to the side of the normals that was chosen, 0 where none was
 
     def named(self, setting: str) -> str:
         """Return what a setting is called there, for errors."""
 
     def has_group(self, name: str) -> bool:
         """Whether there is a group of points of some name."""
+
+    def has_numbers(self, name: str) -> bool:
+        """Whether there are numbers at the points of some name."""
 
     def weights(self, setting: str, name: str, least: int = 1, outside: float = 0.0) -> Array:
         """Return the weights, (n,), of the group that a setting names, and a value for the points outside."""
@@ -64,6 +70,15 @@ class Cloud(Protocol):
 
     def curve(self) -> tuple[Array, bool]:
         """Return the points of a curve, (k, 3), and whether its last one is joined with the first."""
+
+    def ends(self) -> tuple[Array, Array]:
+        """Return the two points that a path is between, (2,) int, and how far they are from where they are wanted."""
+
+    def laplacian(self, progress: Progress) -> Laplacian:
+        """Return the operator, for tools that do not always need it."""
+
+    def reference(self) -> tuple[Cloud, Array]:
+        """Return another cloud, and the offset, (3,), from the points here to those of that."""
 
 
 class Outcome(NamedTuple):
@@ -83,6 +98,12 @@ class Outcome(NamedTuple):
         Which points stay; the others are deleted.
     numbers : mapping of str to ndarray
         Results that are not at the points, by name.
+    figures : mapping of str to object
+        Numbers on it, by name, for programs.
+    matrix : ndarray, (4, 4), optional
+        How the whole cloud is moved, in the coordinates of the reference.
+    made : object
+        What else is made, such as a mesh or a table.
     """
 
     values: Mapping[str, Array]
@@ -91,6 +112,9 @@ class Outcome(NamedTuple):
     points: Array | None = None
     kept: Array | None = None
     numbers: Mapping[str, Array] = {}
+    figures: Mapping[str, Any] = {}
+    matrix: Array | None = None
+    made: Any = None
 
 
 class AnyTool(Generic[Subject]):
@@ -99,12 +123,14 @@ class AnyTool(Generic[Subject]):
     `own` of its methods has the values of the settings as attributes.
     """
 
-    name: str  # of Blender's operator; the subcommand has - for _
+    name: str  # of Blender's operator
+    verb = ""  # the subcommand, if it is not the name with - for _
     label: str
     help: str  # a sentence without its period: tooltip, and help
     settings: tuple[Setting, ...] = ()
     showing: tuple[Setting, ...] = ()  # those that choose which result is shown, in Blender alone
     reads: tuple[str, ...] = ()  # beside points: "sources" or "curve"
+    reference = ""  # what another cloud is for, if it reads one
     panel: Row | None = None  # home: the label of a panel
     menu: Row | None = None  # home: "Object", or "Points" in Edit Mode
     quick: Row | None = None  # of context menus, with the same homes: run by one click
@@ -126,6 +152,11 @@ class AnyTool(Generic[Subject]):
     def writes(self, own: Any) -> tuple[str, ...]:
         """Return the names of the attributes that are written."""
         return written_by(self.name)
+
+    @property
+    def shows(self) -> bool:
+        """Whether it has results at the points, to be shown at the end."""
+        return bool(written_by(self.name))
 
     def shown(self, own: Any) -> str:
         """Return the name of the attribute to show."""

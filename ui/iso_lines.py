@@ -9,7 +9,7 @@ from ..operators.objects.attributes import own_positions, read_attribute
 from ..operators.objects.curves import add_curves
 from ..operators.registration import Registration, Row
 from ..operators.running.application import ApplicationOperator, operator_reader
-from ..operators.tools.mesh import surface_mesh
+from ..tools.mesh_surface import carried_mesh
 from .display import component, label, shown_attribute, shown_range, sloping, step_colors
 
 _COUNT = 10  # of lines, where none are shown
@@ -102,7 +102,7 @@ def _on_points(context, obj, values):
     reading, operator = operator_reader(context, obj)
 
     def compute(progress):
-        mesh, carrying = surface_mesh(operator(progress), 1.0, progress)
+        mesh, carrying = carried_mesh(operator(progress), 1.0, progress)
         known, count = np.isfinite(values), len(mesh.vertices)
         carried = carrying.interpolate(np.where(known, values, 0.0))[-count:]
         if not known.all():

@@ -5,7 +5,7 @@ from math import isfinite, nan
 import bpy
 from bpy.props import BoolProperty, FloatProperty, IntProperty
 
-from ...command.measures import PartRow
+from ...tools.measure_parts import PartRow
 from .reading import fingerprint, metric
 
 

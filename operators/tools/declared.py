@@ -5,8 +5,9 @@ import numpy as np
 from bpy.props import StringProperty
 
 from ... import core
+from ...command.naming import naming
 from ...tools.listed import listed_tools
-from ...tools.quantities import quantity, written_by
+from ...tools.quantities import quantity
 from ...tools.settings import by_name
 from ...tools.tool import MovingTool, PointTool
 from ..objects.attributes import read_attribute, remove_numbered, tag_changed, write_attribute
@@ -14,16 +15,16 @@ from ..objects.curves import read_curve
 from ..objects.deleting import check_deletable, keep_points
 from ..objects.groups import chosen_weights, group_kind, has_group
 from ..objects.options import default_options
+from ..objects.place import place_of
 from ..objects.positions import check_movable, target_property, write_positions
 from ..objects.properties import properties_of, values_of
-from ..objects.reading import read_points
 from ..objects.result import length_text
 from ..objects.splats import has_splats
 from ..registration import Registration
 from ..running import cache
 from ..running.application import ApplicationOperator, ShownOperator, Tool, operator_reader
 from ..running.discs import disc_finder
-from .select import read_sources
+from .select import SelectionOperator, read_sources, selected_ends
 
 _CURVE = StringProperty(
     name="Curve",
@@ -36,10 +37,12 @@ class ObjectCloud:
 
     in_blender = True
 
-    def __init__(self, context, obj, operator, reading):
-        self._context, self._obj, self._operator = context, obj, operator
+    def __init__(self, context, obj, operator, reading, build):
+        self.obj, self._context, self._operator, self._build = obj, context, operator, build
         self.name, self.where, self.kind = obj.name, f'"{obj.name}"', group_kind(obj)
         self.points, self.out = reading.points, cache.floating(reading.splats)
+        self.place, self.orientation = place_of(obj), reading.orientation
+        self.heights_from = np.array(obj.matrix_world.translation)
         self.repeats = operator.is_repeated(context)
         self.boundary, self.options = reading.boundary, default_options(obj.meshfree)
 
@@ -49,31 +52,56 @@ class ObjectCloud:
 
     def has_group(self, name):
         """Whether the object has a group of some name."""
-        return has_group(self._obj, name)
+        return has_group(self.obj, name)
+
+    def has_numbers(self, name):
+        """Whether the object has an attribute of some name."""
+        return name in self.obj.data.attributes
 
     def weights(self, setting, name, least=1, outside=0.0):
         """Return the weights of the group that a setting names, (n,)."""
-        return chosen_weights(self._obj, name, self.named(setting), least, outside)
+        return chosen_weights(self.obj, name, self.named(setting), least, outside)
 
     def numbers(self, setting, name):
         """Return the values of the attribute that a setting names."""
-        return read_attribute(self._obj.data, name)
+        return read_attribute(self.obj.data, name)
 
     def sources(self, name):
         """Return the points of a group or, if the default one is missing, the selected ones, (n,) bool."""
-        return read_sources(self._obj, name)
+        return read_sources(self.obj, name)
 
     def curve(self):
         """Return the points of the curve that the operator names, (k, 3), as points are read, and if it is closed."""
         places, closed = read_curve(self._context, self._operator.curve)
-        return places - np.array(self._obj.matrix_world.translation), closed
+        return places - self.heights_from, closed
+
+    def ends(self):
+        """Return the two selected points, (2,) int, which lie where they are wanted."""
+        return selected_ends(self.obj), np.zeros(2)
+
+    def laplacian(self, progress):
+        """Return the operator."""
+        with naming(self.name):
+            return self._build(progress)
+
+    def reference(self):
+        """Return the cloud of the object that the operator names, and the offset of its points."""
+        other = self._operator.reference_of(self._context)
+        with naming(other.name):
+            cloud = ObjectCloud(self._context, other, self._operator, *operator_reader(self._context, other))
+        # Points are read without the location of their objects.
+        return cloud, self.heights_from - cloud.heights_from
 
 
 class Declared(Tool):
     """The work of a declared tool on objects, by settings that are its attributes."""
 
     tool = None
-    last = ("show",)  # names of settings that the tool does not declare
+
+    @property
+    def last(self):
+        """Names of settings that the tool does not declare."""
+        return ("show",) if self.tool.shows else ()
 
     @property
     def asks(self):
@@ -101,10 +129,14 @@ class Declared(Tool):
         """Return the values of the settings as attributes."""
         return values_of(self, self.tool.settings)
 
+    def inputs(self, cloud, own):
+        """Return what the tool takes beside the points."""
+        return self.tool.inputs(cloud, own)
+
     def plan(self, context, obj):
         reading, operator = operator_reader(context, obj)
         tool, own = self.tool, self.own()
-        inputs = tool.inputs(ObjectCloud(context, obj, self, reading), own)
+        inputs = self.inputs(ObjectCloud(context, obj, self, reading, operator), own)
 
         def compute(progress):
             laplacian = operator(progress)
@@ -133,16 +165,11 @@ class Declared(Tool):
 class Pointwise(Declared):
     """The work of a declared tool that needs the points of objects alone."""
 
-    @property
-    def last(self):
-        """Names of settings that the tool does not declare."""
-        return ("show",) if written_by(self.tool.name) else ()
-
     def plan(self, context, obj):
         if self.tool.deletes:
             check_deletable(obj)
-        reading, tool, own = read_points(context, obj), self.tool, self.own()
-        inputs = tool.inputs(ObjectCloud(context, obj, self, reading), own)
+        (reading, operator), tool, own = operator_reader(context, obj), self.tool, self.own()
+        inputs = self.inputs(ObjectCloud(context, obj, self, reading, operator), own)
         return lambda progress: (tool.compute(reading.points, inputs, own, progress), reading.points, own, reading)
 
     def write(self, context, obj, result):
@@ -213,12 +240,9 @@ def operator_of(tool, *mixins):
     properties = properties_of((*tool.settings, *tool.showing))
     if "curve" in tool.reads:
         properties["curve"] = _CURVE
-    if isinstance(tool, MovingTool):
-        bases = Moving, ApplicationOperator
-    elif isinstance(tool, PointTool):
-        bases = Pointwise, ShownOperator if written_by(tool.name) else ApplicationOperator
-    else:
-        bases = Declared, ShownOperator
+    work = Moving if isinstance(tool, MovingTool) else Pointwise if isinstance(tool, PointTool) else Declared
+    applied = ShownOperator if tool.shows else ApplicationOperator
+    bases = work, SelectionOperator if tool.menu is not None and tool.menu.home == "Points" else applied
     at_zero = {setting.name: setting.at_zero for setting in tool.settings if setting.at_zero}
     for mixin in mixins:
         properties |= mixin.__annotations__

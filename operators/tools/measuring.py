@@ -9,17 +9,16 @@ from bpy.props import BoolProperty, FloatProperty
 from ... import core
 from ...command.measures import Base, pile_over
 from ...command.naming import naming
-from ...command.profiles import path_between
-from ...command.sections import UP
 from ...core import PointCloudError
+from ...tools.cross_section import UP
+from ...tools.profile import path_between
 from ..objects.curves import add_curves
 from ..objects.planes import object_of, plane_of
 from ..objects.reading import obstacle
 from ..objects.result import area_text, length_text, volume_text
 from ..registration import Registration, Row
-from ..running import cache
 from ..running.application import operator_reader
-from .select import SelectionOperator, analyzed, selected
+from .select import SelectionOperator, analyzed, selected, selected_ends
 
 
 class Figure(NamedTuple):
@@ -211,7 +210,7 @@ class MESHFREE_OT_geodesic_path(SelectionOperator, bpy.types.Operator):
     def prepare(self, context, obj):
         ends = selected_ends(obj)
         reading, laplacian = analyzed(context, obj)
-        path = path_between(laplacian, ends, cache, lambda *_: None)
+        path = path_between(laplacian, ends, lambda *_: None)
         straight = length_text(core.distance.polygon_length(laplacian.points[ends]))
         line = f"{length_text(core.distance.polygon_length(path))} along the surface, {straight} straight"
 
@@ -222,16 +221,6 @@ class MESHFREE_OT_geodesic_path(SelectionOperator, bpy.types.Operator):
             return f"{made.name} is {line}"
 
         return add
-
-
-def selected_ends(obj):
-    """Return the two points that are selected, between which a path leads, (2,) int."""
-    ends = np.flatnonzero(selected(obj))
-    if len(ends) != 2:
-        raise PointCloudError(
-            f'{len(ends):,} points of "{obj.name}" are selected. Select the two between which the path leads.'
-        )
-    return ends
 
 
 TOOLS = (

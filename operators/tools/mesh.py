@@ -3,11 +3,10 @@
 import bmesh
 import bpy
 import numpy as np
-from bpy.props import BoolProperty, FloatProperty
+from bpy.props import BoolProperty
 
-from ... import core
 from ...command.colors import COLOR, average
-from ...command.meshing import GAP, MESH
+from ...tools import mesh_surface
 from ...tools.quantities import quantity
 from ..objects.attributes import DISC, STORABLE, point_count, read_attribute, write_attribute
 from ..objects.color_choices import COLOR_CHOICES
@@ -16,27 +15,19 @@ from ..objects.groups import add_group
 from ..objects.handlers import notify
 from ..objects.place import activate, copy_place, hide
 from ..objects.splats import has_splats
-from ..registration import Registration, Row
-from ..running.application import ApplicationOperator, Tool, operator_reader
 from ..running.measures import carry
+from .declared import registration_of
 
 _LEFT = DISC, "position"  # attributes that are not valid on a mesh
 _STEPS = 255  # of weights
 
 
-class MeshSurface(Tool):
-    """The settings and the work of `meshfree.mesh_surface`."""
+class MeshObject:
+    """What Blender adds to the tool: an object of the mesh."""
 
-    asks = ("detail", "keep_open")
-    adjustable = ("detail", "keep_open")
-    made = ()  # names of objects and of their meshes, and numbers of open edges
+    last = ("keep_open",)
+    made = ()  # names of objects and of their meshes
 
-    detail: FloatProperty(
-        name="Detail",
-        soft_min=0.25,
-        soft_max=4.0,
-        **MESH["detail"].keywords,
-    )
     keep_open: BoolProperty(
         name="Keep Open",
         description="End the mesh where the points end; otherwise all openings are closed, such as for printing",
@@ -44,11 +35,11 @@ class MeshSurface(Tool):
     )
 
     def plan(self, context, obj):
-        reading, operator = operator_reader(context, obj)
-        detail, kept = self.detail, _Kept(obj)
+        planned, kept = super().plan(context, obj), _Kept(obj)
 
         def compute(progress):
-            mesh, carrying = surface_mesh(operator(progress), detail, progress)
+            _, laplacian, own, reading = planned(progress)
+            mesh, carrying = mesh_surface.carried_mesh(laplacian, own.detail, progress)
             faces = mesh.faces if np.linalg.det(reading.matrix) > 0.0 else mesh.faces[:, ::-1]
             carried = kept.carried(carrying, len(mesh.vertices))
             return reading.local(mesh.vertices), faces, carried, mesh.notices
@@ -62,38 +53,23 @@ class MeshSurface(Tool):
             collection.objects.link(made)
         made.matrix_world = obj.matrix_world
         copy_place(made, obj)
-        opened = close_holes(made.data, GAP if self.keep_open else 0)
+        opened = close_holes(made.data, mesh_surface.GAP if self.keep_open else 0)
         carried.write(made)
         for name in COLOR_CHOICES:
             setattr(made.meshfree, name, getattr(obj.meshfree, name))
-        self.made = (*self.made, (obj.name, made.name, opened))
-        state = "closed" if not opened else "open"
-        return [*notices, f"{made.name}: {len(made.data.polygons):,} faces, {state}. The points are hidden"]
+        self.made = (*self.made, (obj.name, made.name))
+        line = mesh_surface.line(len(made.data.polygons), opened)
+        return [*notices, f"{made.name}: {line}. The points are hidden"]
 
     def conclude(self, context, objects):
         """Show the meshes like their points, and hide these."""
-        made = {name: bpy.data.objects[other] for name, other, _ in self.made}
+        made = {name: bpy.data.objects[other] for name, other in self.made}
         self.made = ()
         for obj in objects:
             notify("mesh_made", obj, made[obj.name])
         activate(context, *(made[obj.name] for obj in objects))
         for obj in objects:
             hide(obj)
-
-
-class MESHFREE_OT_mesh_surface(MeshSurface, ApplicationOperator, bpy.types.Operator):
-    """Reconstruct a mesh from the points, with their results, colors and groups on its vertices"""
-
-    bl_idname = "meshfree.mesh_surface"
-    bl_label = "Surface from Points"
-
-
-def surface_mesh(laplacian, detail, progress):
-    """Return a mesh of the points of an operator, and the `Prolongation` to its vertices, made only once."""
-    mesh = core.surface.mesh_surface(laplacian, detail, progress=progress)
-    report = lambda: progress("Results", 0.95)  # noqa: E731
-    carry_to = lambda: core.surface.values_on_mesh(laplacian, mesh.vertices, progress=report)  # noqa: E731
-    return mesh, laplacian.kept.result("values on mesh", carry_to, detail)
 
 
 class _Kept:
@@ -190,4 +166,4 @@ def close_holes(mesh, most):
     return opened
 
 
-TOOLS = (Registration(MESHFREE_OT_mesh_surface, panel=Row("Mesh", 1, 1), menu=Row("Object", 2, 1)),)
+TOOLS = (registration_of(mesh_surface.TOOL, MeshObject),)

@@ -1,21 +1,22 @@
-"""Cross sections of the surface by a plane, as curve objects."""
+"""Cross sections of the surface by planes of objects, as curve objects."""
 
 import bpy
 from bpy.props import FloatProperty, StringProperty
 
-from ...command import sections
+from ...tools import cross_section
 from ..objects.curves import add_curves
 from ..objects.planes import plane_of
-from ..objects.result import area_text, length_text
-from ..registration import Registration, Row
-from ..running.application import ApplicationOperator, Tool, operator_reader
+from ..objects.result import length_text
+from .declared import registration_of
 
 
-class CrossSection(Tool):
-    """The settings and the work of `meshfree.cross_section`."""
+class SectionCurves:
+    """What Blender adds to the tool: an object whose plane cuts, and one of the curves."""
 
     changes = False
-    asks = adjustable = ("plane", "thickness")
+    only_active = True
+    last = adjustable = "plane", "thickness"
+    asks = last
 
     plane: StringProperty(
         name="Plane",
@@ -30,36 +31,17 @@ class CrossSection(Tool):
         subtype="DISTANCE",
     )
 
-    def plan(self, context, obj):
-        reading, operator = operator_reader(context, obj)
-        name, guessed = obj.name, []
-        if self.plane:
-            place, normal = plane_of(context.scene, self.plane, obj)
-        else:
-            place, normal = sections.middle(reading.points), sections.UP
-            guessed = [f"{name} is cut by the horizontal plane through its middle: no Plane is chosen."]
-
-        def compute(progress):
-            laplacian = operator(progress)
-            found = sections.cut(laplacian, place, normal, name, progress)
-            lines = [(reading.local(curve.points), curve.closed) for curve in found.curves]
-            return found, lines, guessed
-
-        return compute
+    def inputs(self, cloud, own):
+        if not self.plane:
+            return super().inputs(cloud, own)
+        return *plane_of(bpy.context.scene, self.plane, cloud.obj), (), cloud.name
 
     def write(self, context, obj, result):
-        found, lines, guessed = result
+        found, laplacian, own, reading = result
+        outcome = self.tool.finish(found, laplacian, own, length_text)
+        lines = [(reading.local(curve.points), curve.closed) for curve in outcome.made]
         made = add_curves(obj, f"{obj.name} Section", lines, self.thickness)
-        line = sections.section_line(found, made.name, length_text, area_text)
-        return [*guessed, *found.notices, line]
+        return [*outcome.notices, f"{made.name}: {outcome.line}"]
 
 
-class MESHFREE_OT_cross_section(CrossSection, ApplicationOperator, bpy.types.Operator):
-    """Cut the surface by a plane: curves, with their length and the area that they enclose"""
-
-    bl_idname = "meshfree.cross_section"
-    bl_label = "Cross Section"
-    only_active = keeps_line = True
-
-
-TOOLS = (Registration(MESHFREE_OT_cross_section, panel=Row("Measure", 6, 2), menu=Row("Object", 7, 5)),)
+TOOLS = (registration_of(cross_section.TOOL, SectionCurves),)

@@ -151,6 +151,16 @@ def selected(obj):
     return chosen
 
 
+def selected_ends(obj):
+    """Return the two points that are selected, between which a path leads, (2,) int."""
+    ends = np.flatnonzero(selected(obj))
+    if len(ends) != 2:
+        raise PointCloudError(
+            f'{len(ends):,} points of "{obj.name}" are selected. Select the two between which the path leads.'
+        )
+    return ends
+
+
 def read_sources(obj, group):
     """Read the points of a group or, if the default one is missing, the selected ones, (n,) bool."""
     return chosen_members(obj, group, "Sources") if is_chosen(obj, group, SOURCE) else selected(obj)

@@ -24,6 +24,7 @@ def _names():
             if isinstance(node, ast.ClassDef) and node.name.startswith("MESHFREE_OT_"):
                 yield node.name.removeprefix("MESHFREE_OT_")
     yield from (tool.name for tool in listed_tools())
+    yield "compare_swap"  # a tool of Blender alone, declared by that which compares
 
 
 OPERATORS = sorted(_names())

@@ -123,7 +123,7 @@ def test_a_plane_that_slides_is_moved_and_told():
     assert scan.matrix_world.translation.z == pytest.approx(0.0, abs=1e-3)
     warning, line = scan.meshfree.notices
     assert (warning.level, line.level) == ("WARNING", "INFO")
-    assert warning.text.startswith("Not aligned in every direction. The surface can slide")
+    assert warning.text.startswith("Scan: Not aligned in every direction. The surface can slide")
 
 
 def test_another_shape_is_refused_and_stays():
@@ -174,7 +174,7 @@ def test_a_parent_that_would_shear_is_refused(pair):
 
 def test_the_other_one_must_stay_meanwhile(pair):
     plan, scan = pair
-    motion = part("operators.tools.align").Motion(scan, np.zeros(3), plan)
+    motion = part("operators.tools.align").Motion(scan, plan)
     plan.location.x = 1.0
     bpy.context.view_layer.update()
     with pytest.raises(ValueError, match='"Plan" was moved meanwhile'):
@@ -198,7 +198,7 @@ def test_a_comparison_can_begin_with_it(pair):
     bpy.ops.meshfree.compare(align_first=True)
     assert off(scan) < 5e-3
     assert np.abs(attribute(scan, "lb_deviation")).mean() < 3e-3
-    assert any("Scan was moved" in notice.text for notice in scan.meshfree.notices)
+    assert any("Scan: It was moved" in notice.text for notice in scan.meshfree.notices)
 
 
 def test_a_comparison_of_what_cannot_be_aligned_changes_nothing():

@@ -450,7 +450,9 @@ def test_how_many_modes_to_write_is_asked_only_where_not_all_are(name, count):
 
 
 def test_the_detail_of_a_mesh_can_be_adjusted():
-    assert "detail" in bpy.types.MESHFREE_OT_mesh_surface.adjustable
+    kind = bpy.types.MESHFREE_OT_mesh_surface
+    tool = part("tools.mesh_surface").TOOL
+    assert kind.adjustable.fget(SimpleNamespace(tool=tool, last=kind.last)) == ("detail", "keep_open")
 
 
 def open_settings():

@@ -13,8 +13,8 @@ from benchmarks.samplings import fibonacci_sphere, square_grid
 from command import verbs
 from command.colors import linear
 from command.line import run as run_command
-from command.meshing import close_gaps
 from core.files import PointTable, read_points, write_points
+from tools.mesh_surface import close_gaps
 from tools.quantities import rows_of
 
 FAR = np.array([400_000.0, 5_000_000.0, 100.0])
