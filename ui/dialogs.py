@@ -9,7 +9,7 @@ from ..operators.files.importing import MESHFREE_OT_import_points
 from ..operators.files.tiles import MESHFREE_OT_import_tiles
 from ..operators.objects.groups import has_group
 from ..operators.running.application import ApplicationOperator
-from ..operators.tools.profile import MESHFREE_OT_profile
+from ..operators.tools.profile import ProfileCurve
 from ..operators.tools.select import MESHFREE_OT_select_grow, selection
 from ..operators.tools.sequence import MESHFREE_OT_analyze_sequence
 from ..tools.groups import FIXED, HIGH, LOW, ROLES, SOURCE, VALUE
@@ -81,7 +81,7 @@ def _draw(operator, context, names):
 
 
 # At import: Blender checks at registration whether a class has a layout of its own.
-ApplicationOperator.draw = MESHFREE_OT_profile.draw = _draw_tool
+ApplicationOperator.draw = ProfileCurve.draw = _draw_tool
 _ASKING = (
     MESHFREE_OT_export_points,
     MESHFREE_OT_export_splats,

@@ -8,6 +8,7 @@ from ...core import PointCloudError
 from ...tools import align_points
 from ..objects.place import check_movable, move_object, moves_with
 from ..objects.reading import TYPES, find_object, obstacle
+from ..objects.result import length_text
 from .declared import registration_of
 from .select import selection
 
@@ -69,7 +70,7 @@ class Onto:
         planned, motion = result
         if motion is not None:
             found, points, own, _ = planned
-            matrix = self.tool.finish(found, points, own, str).matrix
+            matrix = self.tool.finish(found, points, own, length_text).matrix
             self._move = lambda: motion.apply(obj, matrix)
         return super().write(context, obj, planned)
 

@@ -85,7 +85,7 @@ def test_gaps_are_told(obj):
 
 def test_what_has_no_profile_is_refused(obj):
     obj.data.attributes.new("label", "INT", "POINT")
-    with refused(obj, 'no attribute "nothing"'):
+    with refused(obj, "no attribute nothing"):
         bpy.ops.meshfree.profile(source="nothing")
     with refused(obj, "is not one number"):
         bpy.ops.meshfree.profile(source="label")

@@ -573,9 +573,9 @@ def test_wrong_arguments_are_refused_in_words(function, fixed, arguments):
 )
 def test_work_reports_how_far_it_is_and_may_be_stopped_at_any_report(function, fixed, arguments):
     def run(progress):
-        for given in fixed.values():
-            if isinstance(given, core.LaplaceBeltrami):
-                given.release()
+        for each in fixed.values():
+            if isinstance(each, core.LaplaceBeltrami):
+                each.release()
         function(**fixed, **arguments, progress=progress)
 
     reports = []
