@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.blender.clouds import add_group, add_object, attribute, grid_points, local_points, sphere_points
 from tests.blender.conftest import new_file, part
 from tests.blender.splats import bar_splats
+from tests.blender.test_pointcloud import add_pointcloud
 
 POINTS = sphere_points()
 FAR = np.array([400_000.0, 5_000_000.0, 100.0])
@@ -482,6 +483,20 @@ class TestWriting:
         inputs = [write(tmp_path / f"{name}.csv", POINTS[: 900 + 50 * name]) for name in (1, 2)]
         assert run("roughness", *inputs, "--out-dir", tmp_path / "out")[0] == 0
         assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["1.blend", "2.blend"]
+
+
+@pytest.mark.skipif(bpy.app.version < (4, 5), reason="objects become point clouds from Blender 4.5 on")
+def test_objects_of_point_clouds(run, tmp_path):
+    """Their groups are attributes."""
+    add_pointcloud(POINTS)
+    file, out = save(tmp_path / "a.blend"), tmp_path / "b.blend"
+    code, [line] = run("geodesic-distance", file, "--out", out)
+    assert code == 0, line
+    assert opened(out).type == "POINTCLOUD"
+    assert (attribute(bpy.context.object, "lb_distance")[attribute(bpy.context.object, "Source")] == 0.0).all()
+    code, [line] = run("thin-out", file, "--by", "number", "--count", 500, "--out", out)
+    assert (code, line["points"]) == (0, 500), line
+    assert len(opened(out).data.points) == 500
 
 
 @pytest.mark.parametrize(("suffix", "importer"), [("ply", "ply_import"), ("obj", "obj_import"), ("stl", "stl_import")])
