@@ -19,7 +19,6 @@ SERVER = "needs a server; tests/gui/test_repository.py runs it with one"
 DASK = "needs a cluster; tests/wheel/test_scale.py runs it on workers of its own"
 SLOW = "takes minutes to hours; test_pages.py of the core looks for the module"
 NOT_RUN = {
-    "meshfree VERB IN [IN ...] --out FILE | --out-dir DIR [options] [--format FORMAT]": "a form",
     "blender --command meshfree VERB IN [IN ...] --out FILE | --out-dir DIR [options] [--format FORMAT]": "a form",
     "bpy.ops.meshfree.<name>()": "stands for every operator",
     "blender -b FILE -a": "a form, of a command of Blender",
