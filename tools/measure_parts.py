@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import core
-from .quantities import ROUGHNESS, SEGMENT
+from .quantities import SEGMENT, written_by
 from .settings import Setting
 from .tool import Array, Cloud, Laplacian, Length, Outcome, Progress, Row, Tool
 
@@ -74,7 +74,8 @@ class MeasureParts(Tool):
         labels = cloud.numbers("", SEGMENT) if cloud.has_numbers(SEGMENT) else None
         if labels is not None:
             check_labels(labels, SEGMENT, cloud.where)
-        name = own.source or (ROUGHNESS if cloud.has_numbers(ROUGHNESS) else "")
+        [usual] = written_by("roughness")
+        name = own.source or (usual if cloud.has_numbers(usual) else "")
         values = cloud.numbers("source", name) if name else None
         if values is not None:
             check_numbers(values, name, cloud.where)
