@@ -1,25 +1,8 @@
-"""The side of normals, for the command line and for Blender's tool."""
+"""The side of normals, which positions in the coordinates of a file may tell."""
 
-import numpy as np
-
-from . import core
-from .settings import Setting, place
-
-ORIENT = {
-    setting.name: setting
-    for setting in (
-        Setting(
-            "method",
-            "How the side is found",
-            "WINDING",
-            choices=("WINDING", "OUTSIDE", "VIEWPOINT", "ATTRIBUTE", "KEEP"),
-        ),
-        Setting("source", "Vector attribute, for Attribute", ""),
-        Setting("holds", "Meaning of the vectors of the attribute", "POSITIONS", choices=("POSITIONS", "DIRECTIONS")),
-        Setting("flip", "Reverse all normals afterwards", False),
-    )
-}
-_METHODS = {"WINDING": "winding", "OUTSIDE": "outside"}  # in core; others are by viewpoints
+from . import analysis, clouds, core, quantities
+from .settings import place
+from .tool_verb import ToolVerb
 
 
 def add_viewpoint(parser, implied, convert=place):
@@ -33,87 +16,27 @@ def add_viewpoint(parser, implied, convert=place):
     )
 
 
-def imply_method(parser, arguments):
-    """Set the method that a viewpoint or a column implies, and refuse others, by `parser.error`."""
-    implied = {"VIEWPOINT": arguments.viewpoint, "ATTRIBUTE": arguments.source}
-    for method, value in implied.items():
-        if value is None or len(value) == 0:
-            continue
-        if arguments.method is None:
-            arguments.method = method
-        elif arguments.method != method:
-            option = "--viewpoint" if method == "VIEWPOINT" else "--source"
-            parser.error(f"{option} goes with the method {method}, not {arguments.method}")
+class OrientVerb(ToolVerb):
+    """The verb `orient`, which writes the analysis with the side."""
 
+    def add_options(self, parser):
+        add_viewpoint(parser, "the method VIEWPOINT", clouds.place_or_object)
+        super().add_options(parser)
 
-def check_vectors(vectors, name, where):
-    """Refuse an attribute that does not hold vectors."""
-    if vectors.ndim != 2:
-        raise core.PointCloudError(
-            f'The attribute "{name}" of {where} holds no vectors. Choose one with a vector for each point.'
-        )
+    def check(self, parser, arguments):
+        """Set the method that a viewpoint or a column implies, and refuse others."""
+        given = {"VIEWPOINT": ("--viewpoint", arguments.viewpoint), "ATTRIBUTE": ("--source", arguments.source)}
+        for method, (option, value) in given.items():
+            missing = value is None or len(value) == 0
+            if missing and arguments.method == method:
+                parser.error(f"the method {method} needs {option}")
+            if not missing and arguments.method not in (None, method):
+                parser.error(f"{option} goes with the method {method}, not {arguments.method}")
+            if not missing:
+                arguments.method = method
 
-
-def seen_from(vectors, points, holds, name, where):
-    """Return from where points were seen, and notices of those of which no vector says it.
-
-    Parameters
-    ----------
-    vectors, points : ndarray, (n, 3)
-        In the same coordinates.
-    holds : str
-        A value of the setting.
-    name : str
-        Of the attribute.
-    where : str
-        Of what it is.
-
-    Returns
-    -------
-    ndarray, (n, 3)
-        Points without a vector are seen from themselves, which says nothing of their side.
-    list of str
-    """
-    there = np.isfinite(vectors).all(axis=1)
-    count, missing = len(there), int(np.count_nonzero(~there))
-    if missing == count:
-        raise core.PointCloudError(
-            f'The attribute "{name}" of {where} is NaN at all {count:,} points. Choose one that has vectors.'
-        )
-    places = np.where(there[:, None], vectors + points if holds == "DIRECTIONS" else vectors, points)
-    told = f'{where}: {missing:,} of {count:,} points have no "{name}" (NaN). They take the side of the others around.'
-    return places, [told] if missing else []
-
-
-def outward(points, normals, areas, method, viewpoint, flip, keep):
-    """Return normals, (n, 3), on the side that settings name.
-
-    Parameters
-    ----------
-    points, normals : ndarray, (n, 3)
-    areas : ndarray, (n,)
-    method, flip
-        Values of the settings in `ORIENT`.
-    viewpoint : ndarray, (3,) or (n, 3), or None
-        From where points were seen.
-    keep : callable
-        Function of the name of a method, a viewpoint and a function without arguments, which returns the result of the
-        latter, new or kept.
-    """
-    sign = -1.0 if flip else 1.0
-    if method == "KEEP":
-        return sign * normals
-    name = _METHODS.get(method, "viewpoint")
-    return sign * keep(
-        name,
-        viewpoint,
-        lambda: core.orient_normals(points, normals, method=name, viewpoint=viewpoint, areas=areas),
-    )
-
-
-def reversed_line(before, after, name) -> str:
-    """Return how many normals are reversed as a text; `before` may be None."""
-    if before is None:
-        return f"{name}: normals oriented"
-    count = int(np.count_nonzero(np.einsum("ij,ij->i", before, after) < 0.0))
-    return f"{name}: {count:,} of {len(after):,} normals reversed"
+    def write(self, output, cloud, outcome, subject, arguments):
+        turned = subject.toward(outcome.values[quantities.ORIENTATION])
+        values = analysis.Built(turned, core.measure.measure_mean_curvature(turned)).measures
+        values[quantities.ORIENTATION] = values[quantities.NORMAL]
+        return super().write(output, cloud, outcome._replace(values=values), subject, arguments)

@@ -2,9 +2,7 @@
 
 from types import SimpleNamespace
 
-import numpy as np
-
-from . import analysis, clouds, orienting, quantities
+from . import clouds, quantities
 from .cloud_verb import SurfaceVerb, floaters
 from .results import Told
 from .settings import LAPLACIAN, chosen
@@ -51,49 +49,3 @@ class ResultVerb(SurfaceVerb):
         """Return what a tool tells with its only result by the name of its attribute."""
         [row] = quantities.rows_of(self.operator)
         return told._replace(values={row.attribute: told.values})
-
-
-class Orient(ResultVerb):
-    """The verb `orient`."""
-
-    name, operator = "orient", "orient_normals"
-    help = "choose the sign of the normals, for the results and all that is computed from them later"
-    settings = tuple(orienting.ORIENT.values())
-
-    def add_options(self, parser):
-        orienting.add_viewpoint(parser, "the method VIEWPOINT", clouds.place_or_object)
-        super().add_options(parser)
-
-    def check(self, parser, arguments):
-        orienting.imply_method(parser, arguments)
-        needed = {"VIEWPOINT": ("--viewpoint", arguments.viewpoint), "ATTRIBUTE": ("--source", arguments.source)}
-        option, value = needed.get(arguments.method, ("", ""))
-        if option and (value is None or len(value) == 0):
-            parser.error(f"the method {arguments.method} needs {option}")
-
-    def wanted(self, cloud, own, arguments):
-        if own.method == "VIEWPOINT":
-            viewpoint = arguments.viewpoint
-            return (cloud.owner.place(viewpoint) if isinstance(viewpoint, str) else viewpoint) - cloud.place, []
-        if own.method != "ATTRIBUTE":
-            return None, []
-        vectors = cloud.numbers(own.source, "--source").astype(np.float64)
-        orienting.check_vectors(vectors, own.source, str(cloud.path))
-        vectors -= cloud.place if own.holds == "POSITIONS" else 0.0
-        return orienting.seen_from(vectors, cloud.points, own.holds, own.source, cloud.path.name)
-
-    def compute(self, built, wanted, name, own, progress):
-        laplacian, (viewpoint, notices) = built.laplacian, wanted
-        progress("Orientation", 0.9)
-        sides = orienting.outward(
-            laplacian.points,
-            laplacian.normals,
-            laplacian.areas,
-            own.method,
-            viewpoint,
-            own.flip,
-            lambda method, viewpoint, compute: compute(),
-        )
-        turned = analysis.oriented(built, sides)
-        values = {**turned.measures, quantities.ORIENTATION: turned.measures[quantities.NORMAL]}
-        return Told(values, notices, orienting.reversed_line(None, sides, name))

@@ -12,6 +12,8 @@ from .groups import add_at, check_sources, read_sources, read_weights
 from .results import number_text
 from .settings import LAPLACIAN, chosen, default_options
 
+check_vectors = tools.groups.check_vectors
+
 
 class _Declared:
     """A subcommand of a tool."""
@@ -153,6 +155,16 @@ class FileCloud:
     def numbers(self, setting, name):
         """Return the column that a setting names."""
         return self._cloud.numbers(name, self.named(setting))
+
+    def vectors(self, setting, name, places):
+        """Return the vectors in a column, (n, 3), as places less that of the points."""
+        vectors = check_vectors(self.numbers(setting, name), name, self.where).astype(np.float64)
+        return vectors - self.place if places else vectors
+
+    def viewpoint(self):
+        """Return the position, or that of an object, from which the points were seen, (3,)."""
+        given = self._arguments.viewpoint
+        return (self._cloud.owner.place(given) if isinstance(given, str) else given) - self.place
 
     def sources(self, name):
         """Return the points nearest to given positions or, without these, those of a group, (n,) bool."""

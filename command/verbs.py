@@ -5,8 +5,8 @@ from .analysis import WRITE_LIMIT
 from .bending import Deform, SplatInfo
 from .cloud_verb import CloudVerb, SurfaceVerb, floaters
 from .mesh_verb import MeshVerb
+from .orienting import OrientVerb
 from .reference_verbs import AlignVerb, CompareVerb, MeasureVerb, TransferAttributes
-from .result_verbs import Orient
 from .settings import LAPLACIAN, Setting, chosen
 from .source_verbs import Simulate
 from .summary import Report
@@ -20,13 +20,14 @@ _DECLARED = {
     "cross_section": SectionVerb,
     "measure_parts": MeasureVerb,
     "mesh_surface": MeshVerb,
+    "orient_normals": OrientVerb,
     "profile": ProfileVerb,
 }
 
 
 def make_verbs() -> list:
     """Return new verbs of all kinds: those on surfaces, those on points, and those that need no object."""
-    others = Orient, Simulate, TransferAttributes
+    others = Simulate, TransferAttributes
     return [Analyze(), *declared_verbs(_DECLARED), *(verb() for verb in others), *without_object()]
 
 

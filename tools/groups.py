@@ -54,6 +54,15 @@ def column_weights(values: Array, name: str, where: str) -> Floats:
     return weights
 
 
+def check_vectors(values: Array, name: str, where: str) -> Array:
+    """Refuse an attribute that does not hold vectors, and return it."""
+    if values.ndim != 2:
+        raise core.PointCloudError(
+            f'The attribute "{name}" of {where} holds no vectors. Choose one with a vector for each point.'
+        )
+    return values
+
+
 def check_enough(weights: Floats, kind: str, name: str, setting: str, least: int = 1, how: str = "") -> None:
     """Refuse weights, (n,), of which fewer than a number are above zero; `how` the group of a kind gets more."""
     count = np.count_nonzero(weights > 0.0)

@@ -65,6 +65,15 @@ class Cloud(Protocol):
     def numbers(self, setting: str, name: str) -> Array:
         """Return the numbers at the points, (n,) or (n, m), that a setting names."""
 
+    def vectors(self, setting: str, name: str, places: bool) -> Array:
+        """Return the vectors at the points, (n, 3), that a setting names, along the axes of `points`.
+
+        They may stand for places in the coordinates of `points`.
+        """
+
+    def viewpoint(self) -> Array:
+        """Return from where the points were seen, (3,)."""
+
     def sources(self, name: str) -> Array:
         """Return the source points, (n,) bool: those of a group, or those that were given in another way."""
 

@@ -6,6 +6,7 @@ from bpy.props import StringProperty
 
 from ... import core
 from ...command.naming import naming
+from ...tools.groups import check_vectors
 from ...tools.listed import listed_tools
 from ...tools.quantities import quantity
 from ...tools.settings import by_name
@@ -38,7 +39,7 @@ class ObjectCloud:
     in_blender = True
 
     def __init__(self, context, obj, operator, reading, build):
-        self.obj, self._context, self._operator, self._build = obj, context, operator, build
+        self.obj, self._context, self._operator, self._build, self._reading = obj, context, operator, build, reading
         self.name, self.where, self.kind = obj.name, f'"{obj.name}"', group_kind(obj)
         self.points, self.out = reading.points, cache.floating(reading.splats)
         self.place, self.orientation = place_of(obj), reading.orientation
@@ -65,6 +66,20 @@ class ObjectCloud:
     def numbers(self, setting, name):
         """Return the values of the attribute that a setting names."""
         return read_attribute(self.obj.data, name)
+
+    def vectors(self, setting, name, places):
+        """Return the vectors of the attribute that a setting names, (n, 3), from local space, as are places."""
+        vectors = check_vectors(read_attribute(self.obj.data, name), name, self.where)
+        return self._reading.placed(vectors.astype(np.float64))
+
+    def viewpoint(self):
+        """Return where the object that the operator names, or the scene's camera, is, (3,)."""
+        scene, name = self._context.scene, self._operator.viewpoint
+        found = scene.objects.get(name) if name else scene.camera
+        if found is None:
+            missing = f'The scene has no object "{name}"' if name else "The scene has no camera"
+            raise core.PointCloudError(f"{missing} to orient normals to. Choose an object as Viewpoint.")
+        return np.array(found.matrix_world.translation - self.obj.matrix_world.translation, dtype=np.float64)
 
     def sources(self, name):
         """Return the points of a group or, if the default one is missing, the selected ones, (n,) bool."""

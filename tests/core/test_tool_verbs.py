@@ -240,7 +240,7 @@ class TestOrient:
             code, [line] = run("orient", source, *options)
             assert code == 0, line
             assert_array_equal(np.load(tmp_path / "a.npz")["normal"][:, 2] > 0.0, left)
-            told = f'a.ply: {np.count_nonzero(~some)} of {len(some)} points have no "given" (NaN).'
+            told = f'{np.count_nonzero(~some)} of {len(some)} points have no "given" (NaN).'
             assert any(notice.startswith(told) for notice in line["notices"])
         code, [line] = run("orient", write(tmp_path / "b.ply", SQUARE, none=np.nan * SQUARE), "--source", "none")
         assert (code, "is NaN at all 400 points" in line["error"]) == (1, True)
