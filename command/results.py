@@ -1,14 +1,4 @@
-"""What verbs write and tell."""
-
-from typing import NamedTuple
-
-
-class Told(NamedTuple):
-    """A result at the points as it is written, with notices, and a line on it."""
-
-    values: object
-    notices: list
-    line: str
+"""What verbs tell."""
 
 
 def number_text(value, power=1) -> str:

@@ -8,7 +8,6 @@ from .mesh_verb import MeshVerb
 from .orienting import OrientVerb
 from .reference_verbs import AlignVerb, CompareVerb, MeasureVerb, TransferAttributes
 from .settings import LAPLACIAN, Setting, chosen
-from .source_verbs import Simulate
 from .summary import Report
 from .table_verbs import ProfileVerb, SectionVerb
 from .tile_verbs import TilesAgree, TilesCut, TilesMeasure, TilesModes, TilesReport, TilesRun, TilesSurvey
@@ -27,8 +26,7 @@ _DECLARED = {
 
 def make_verbs() -> list:
     """Return new verbs of all kinds: those on surfaces, those on points, and those that need no object."""
-    others = Simulate, TransferAttributes
-    return [Analyze(), *declared_verbs(_DECLARED), *(verb() for verb in others), *without_object()]
+    return [Analyze(), *declared_verbs(_DECLARED), TransferAttributes(), *without_object()]
 
 
 def without_object() -> list:

@@ -8,19 +8,17 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ...command import simulation
-from ...command.motions import Chosen, InModes, find_touched, in_modes
 from ...core import PointCloudError
-from ...tools.groups import unreached
+from ...tools import simulate
+from ...tools.motions import InModes, find_touched, in_modes
 from ...tools.quantities import MOTION, NORMAL
 from ..objects import motion_files
 from ..objects.motion import show_frame, show_values, write_frames
 from ..objects.motion_nodes import forget_groups, mode_name, show_motion
 from ..objects.result import length_text
 from ..objects.touching import places_of
-from ..registration import Registration, Row
-from ..running import cache
-from ..running.application import ShownOperator, Tool, operator_reader
+from ..running.application import operator_reader
+from .declared import registration_of
 from .select import read_sources
 
 FOLDER = "//motion"  # beside the file
@@ -60,39 +58,17 @@ class _Frames(NamedTuple):
     distance: float  # how far it went, or the size of a pattern
 
 
-class Simulate(Tool):
-    """The settings and the work of `meshfree.simulate`."""
+class Kept:
+    """What Blender adds to the tool: frames on disk, or modes with nodes; and an object that touches the points."""
 
     adjustable = ()  # everything but Show changes the frames
-    at_zero = {"distance": "Automatic", "width": "Automatic", "frames": "Scene", "height": "None"}
+    at_zero = {"height": "None"}
 
-    kind: EnumProperty(
-        name="Motion",
-        items=[
-            ("HEAT", "Heat", "Spreads from the sources and becomes even"),
-            ("WAVE", "Wave", "A pulse at the sources, which runs in all directions and is reflected at boundaries"),
-            ("REACTION", "Reaction", "Two substances that react and spread: patterns of spots or stripes"),
-            ("FRONT", "Front", "Travels from the sources at one speed, as fire does"),
-        ],
-        **simulation.SIMULATE["kind"].keywords,
-    )
-    group: StringProperty(name="Sources", **simulation.SIMULATE["group"].keywords)
     toucher: StringProperty(
         name="Touching Object",
         description="Object of the scene that starts the motion at each frame where its vertices touch the points, in"
         " place of the sources",
     )
-    pattern: EnumProperty(
-        name="Pattern",
-        items=[
-            ("SPOTS", "Spots", "Spots that divide until they cover the surface"),
-            ("STRIPES", "Stripes", "Winding stripes"),
-        ],
-        **simulation.SIMULATE["pattern"].keywords,
-    )
-    distance: FloatProperty(name="Distance", subtype="DISTANCE", **simulation.SIMULATE["distance"].keywords)
-    width: FloatProperty(name="Width", subtype="DISTANCE", **simulation.SIMULATE["width"].keywords)
-    frames: IntProperty(name="Frames", soft_max=1000, **simulation.SIMULATE["frames"].keywords)
     keep: EnumProperty(
         name="Kept",
         description="How the motion is kept",
@@ -161,19 +137,18 @@ class Simulate(Tool):
             raise PointCloudError("Distance, Width and Height must be numbers. Set them again.")
         modes = self.modes if _as_modes(self) else 0
         step = 1 if modes else self._step(count, len(sources))
-        chosen = Chosen(self.kind, sources, count, step, self.distance, self.width, self.pattern.lower())
-        if touches:
-            chosen = chosen._replace(places=places_of(context, obj, self.toucher, range(first, first + count)))
+        chosen = simulate.chosen(self.own(), sources, count, step)
+        places = places_of(context, obj, self.toucher, range(first, first + count)) if touches else []
         path = None if modes else motion_files.new_path(obj, self.folder)
 
         def compute(progress):
             laplacian = operator(progress)
-            motion_of = find_touched(laplacian, chosen, length_text) if touches else chosen
+            motion_of = find_touched(laplacian, chosen, places, length_text) if touches else chosen
             if modes:
-                motion = in_modes(laplacian, motion_of, modes, cache, progress)
+                motion = in_modes(laplacian, motion_of, modes, progress)
             else:
                 motion = _on_disk(path, laplacian, motion_of, progress)
-            reached = simulation.reached(laplacian, motion_of.sources)
+            reached = simulate.reached(laplacian, motion_of.sources)
             return Simulated(motion, count, step, reached, reading.local_normals(laplacian.normals))
 
         return compute
@@ -199,12 +174,8 @@ class Simulate(Tool):
         show_motion(obj, self.height, result.normals, formula, first, result.frames)
         if self.show:
             _lock_range(settings, self.kind, motion)
-        return [*self.about(obj, result), *self._about_kept(result), self._line(obj, result)]
-
-    def about(self, obj, result) -> list:
-        """Return notices about what was simulated."""
-        notices = unreached(result.reached, "Nothing moves there.")
-        return [*notices, *simulation.dead(self.kind, result.motion.last)]
+        notices = simulate.motion_notices(self, motion, result.reached)
+        return [*notices, *self._about_kept(result), self._line(obj, result)]
 
     def _about_kept(self, result):
         motion, notices = result.motion, []
@@ -232,34 +203,7 @@ class Simulate(Tool):
             size = f"{len(motion.formula.rates)} modes"
         else:
             size = f"{motion.path.stat().st_size / _MEGABYTE:.1f} MB"
-        return f"{simulation.motion_line(self.kind, self.pattern, motion, obj.name, length_text)}, {size}"
-
-
-def _as_modes(tool) -> bool:
-    """Whether a motion is kept as modes, by the settings of a tool."""
-    return tool.keep == "MODES" and tool.kind in _IN_MODES
-
-
-def _on_disk(path, laplacian, chosen, progress) -> _Frames:
-    """Simulate, and write the frames to a file."""
-    seen = simulation.Watched(laplacian, chosen, cache, progress)
-    write_frames(path, chosen.kept, len(chosen.sources), seen)
-    return _Frames(path, seen.low, seen.high, seen.last, seen.distance)
-
-
-def _lock_range(settings, kind, motion):
-    """Show all frames in one range of colors: that of the last ones, which waves and reactions grow or fade to."""
-    settings.range_mode = "LOCKED"
-    settings.range_low, settings.range_high = (-motion.last, motion.last) if kind == "WAVE" else (0.0, motion.last)
-    if kind == "WAVE" and settings.color_map == "AUTO":
-        settings.color_map = "COOL_WARM"
-
-
-class MESHFREE_OT_simulate(Simulate, ShownOperator, bpy.types.Operator):
-    """Simulate heat, waves, patterns or a front along the surface, to be played with the frames of the scene"""
-
-    bl_idname = "meshfree.simulate"
-    bl_label = "Simulate Along Surface"
+        return f"{obj.name}: {simulate.motion_line(self, motion, length_text)}, {size}"
 
     def conclude(self, context, objects):
         super().conclude(context, objects)
@@ -274,4 +218,24 @@ class MESHFREE_OT_simulate(Simulate, ShownOperator, bpy.types.Operator):
             )
 
 
-TOOLS = (Registration(MESHFREE_OT_simulate, panel=Row("Simulate", 1, 1), menu=Row("Object", 6, 3)),)
+def _as_modes(tool) -> bool:
+    """Whether a motion is kept as modes, by the settings of a tool."""
+    return tool.keep == "MODES" and tool.kind in _IN_MODES
+
+
+def _on_disk(path, laplacian, chosen, progress) -> _Frames:
+    """Simulate, and write the frames to a file."""
+    seen = simulate.Watched(laplacian, chosen, progress)
+    write_frames(path, chosen.kept, len(chosen.sources), seen)
+    return _Frames(path, seen.low, seen.high, seen.last, seen.distance)
+
+
+def _lock_range(settings, kind, motion):
+    """Show all frames in one range of colors: that of the last ones, which waves and reactions grow or fade to."""
+    settings.range_mode = "LOCKED"
+    settings.range_low, settings.range_high = (-motion.last, motion.last) if kind == "WAVE" else (0.0, motion.last)
+    if kind == "WAVE" and settings.color_map == "AUTO":
+        settings.color_map = "COOL_WARM"
+
+
+TOOLS = (registration_of(simulate.TOOL, Kept),)

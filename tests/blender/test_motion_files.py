@@ -107,7 +107,7 @@ def test_a_failed_motion_leaves_no_file(cloud, tmp_path, monkeypatch):  # noqa: 
     def fail(*_):
         raise MemoryError
 
-    monkeypatch.setattr(part("command.simulation"), "frame_rows", fail)
+    monkeypatch.setattr(part("tools.simulate"), "frame_rows", fail)
     with pytest.raises(RuntimeError, match="memory is used up"):
         simulate(0.5)
     assert not (tmp_path / "motion").exists()

@@ -76,7 +76,7 @@ def test_a_wave_runs_as_far_as_it_should(cloud):
 
 
 def test_patterns_grow_from_the_sources(monkeypatch):
-    monkeypatch.setattr(part("command.motions"), "_PATTERN_TIME", 1000.0)
+    monkeypatch.setattr(part("tools.motions"), "_PATTERN_TIME", 1000.0)
     obj = add_object(sphere_points(700))
     add_group(obj, "Source", [7])
     bpy.context.scene.frame_end = 20
@@ -89,7 +89,7 @@ def test_patterns_grow_from_the_sources(monkeypatch):
 
 
 def test_a_reaction_that_dies_out_is_told(cloud, monkeypatch):
-    monkeypatch.setattr(part("command.motions"), "_PATTERN_TIME", 300.0)
+    monkeypatch.setattr(part("tools.motions"), "_PATTERN_TIME", 300.0)
     bpy.ops.meshfree.simulate(kind="REACTION", distance=0.2)
     assert frames(cloud)[-1].max() < 0.05
     assert any("died out" in notice.text for notice in cloud.meshfree.notices)

@@ -8,11 +8,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import core
 from benchmarks.samplings import fibonacci_sphere, random_sphere, square_grid
-from command import colors, motions, verbs
+from command import colors, verbs
 from command.cloud_verb import CloudVerb
 from command.line import run as run_command
 from core.files import PointTable, read_points, write_points
 from tests.core.test_command import FAR, write
+from tools import motions
 
 SPHERE = fibonacci_sphere(800)
 SQUARE = square_grid(20)

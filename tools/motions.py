@@ -1,11 +1,15 @@
 """What moves along the surface: heat, waves, patterns and fronts, frame by frame, or as modes."""
 
+from __future__ import annotations
+
 import math
-from typing import NamedTuple
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from . import core
+from .tool import Array, Laplacian, Length, Progress
 
 SPOT = 10.0  # smoothing lengths in the size of a pattern: finer ones are not resolved, and die out
 _WIDTH = 6.0  # smoothing lengths: a pulse that the points resolve
@@ -35,24 +39,24 @@ class Formula(NamedTuple):
     """
 
     function: str
-    rates: np.ndarray
-    modes: np.ndarray
-    starts: np.ndarray
-    shares: np.ndarray
+    rates: Array
+    modes: Array
+    starts: Array
+    shares: Array
 
     @property
     def is_single(self) -> bool:
         """Whether all starts at the time zero, so that nodes need no more than the function."""
         return len(self.starts) == 1 and self.starts[0] == 0.0
 
-    def amplitudes(self, time: float):
+    def amplitudes(self, time: float) -> Array:
         """Return the amplitudes of the modes at a time, (k,)."""
         begun = self.starts <= max(time, 0.0)
         since = max(time, 0.0) - self.starts[begun]
         function = {"COSINE": np.cos, "EXPONENT": np.exp}[self.function]
         return np.sum(self.shares[begun] * function(np.multiply.outer(since, self.rates)), axis=0)
 
-    def at(self, time: float):
+    def at(self, time: float) -> Array:
         """Return the motion at a time, (n,)."""
         return self.modes @ self.amplitudes(time)
 
@@ -65,37 +69,34 @@ class Chosen(NamedTuple):
     kind : {"HEAT", "WAVE", "REACTION", "FRONT"}
     sources : ndarray, (n,) bool
         Where it begins; where it ever does, if something touches the points.
-    count, step : int
+    frames, step : int
         Frames of the scene, and how many are from one that is kept to the next.
     distance, width : float
     pattern : {"spots", "stripes"}
-    places : list of ndarray (k, 3), or None
-        Of what touches the points, for each frame of the scene.
     touched : list of ndarray (k,) int, or None
         The points there, for each frame that is kept: also those touched since the one before.
     """
 
     kind: str
-    sources: np.ndarray
-    count: int
+    sources: Array
+    frames: int
     step: int
     distance: float
     width: float
     pattern: str
-    places: list | None = None
-    touched: list | None = None
+    touched: list[Array] | None = None
 
     @property
     def kept(self) -> int:
         """How many frames are kept."""
-        return -(-(self.count - 1) // self.step) + 1
+        return -(-(self.frames - 1) // self.step) + 1
 
     @property
     def share(self) -> float:
         """Of the time of all frames, from one that is kept to the next."""
-        return self.step / max(self.count - 1, 1)
+        return self.step / max(self.frames - 1, 1)
 
-    def starts(self, number: int):
+    def starts(self, number: int) -> Array:
         """Return the points where something begins at a frame that is kept, (k,) int."""
         if self.touched is not None:
             return self.touched[number] if number < len(self.touched) else np.arange(0)
@@ -126,25 +127,27 @@ class InModes(NamedTuple):
     distance: float
 
 
-def find_touched(laplacian, chosen, length_text) -> Chosen:
-    """Return the settings with the points that are touched: the nearest ones of places that are not too far off."""
-    points, reach = laplacian.points, _width(laplacian, chosen)
-    places = np.concatenate(chosen.places)
-    rows = core.geometry.nearest_rows(points, places)
-    near = (np.linalg.norm(points[rows] - places, axis=1) <= reach) & (laplacian.component[rows] >= 0)
+def find_touched(laplacian: Laplacian, chosen: Chosen, places: list[Array], length: Length) -> Chosen:
+    """Return the settings with the points that are touched: the nearest ones of places that are not too far off.
+
+    The places, (k, 3) each, are those of what touches the points, for each frame of the scene.
+    """
+    points, reach, together = laplacian.points, _width(laplacian, chosen), np.concatenate(places)
+    rows = core.geometry.nearest_rows(points, together)
+    near = (np.linalg.norm(points[rows] - together, axis=1) <= reach) & (laplacian.component[rows] >= 0)
     if not near.any():
         raise core.PointCloudError(
-            f"The Touching Object comes within {length_text(reach)} of no point in any frame. Move it nearer, or raise"
+            f"The Touching Object comes within {length(reach)} of no point in any frame. Move it nearer, or raise"
             " Width."
         )
-    of_scene = np.repeat(np.arange(len(chosen.places)), [len(one) for one in chosen.places])
+    of_scene = np.repeat(np.arange(len(places)), [len(one) for one in places])
     frame = -(-of_scene // chosen.step)
     touched = [np.unique(rows[near & (frame == number)]) for number in range(chosen.kept)]
     return chosen._replace(sources=np.isin(np.arange(len(points)), rows[near]), touched=touched)
 
 
-def frame_rows(laplacian, chosen, cache, progress):
-    """Simulate frame by frame; `cache` keeps results, as Blender's side does, or the module `uncached`.
+def frame_rows(laplacian: Laplacian, chosen: Chosen, progress: Progress) -> tuple[Iterator[Array], float]:
+    """Simulate frame by frame.
 
     Returns
     -------
@@ -154,11 +157,11 @@ def frame_rows(laplacian, chosen, cache, progress):
         How far the motion goes, or the size of a pattern.
     """
     return {"HEAT": _heat, "WAVE": _wave, "REACTION": _reaction, "FRONT": _front}[chosen.kind](
-        laplacian, chosen, cache, progress
+        laplacian, chosen, progress
     )
 
 
-def in_modes(laplacian, chosen, count, cache, progress) -> InModes:
+def in_modes(laplacian: Laplacian, chosen: Chosen, count: int, progress: Progress) -> InModes:
     """Compute heat or a wave as a number of modes.
 
     Each touch drives the modes by what it adds to the motion as they hold it, projected onto them: so many numbers for
@@ -175,7 +178,7 @@ def in_modes(laplacian, chosen, count, cache, progress) -> InModes:
     for number in range(chosen.kept if chosen.touched is not None else 1):
         progress("Frames", number / chosen.kept)
         time = number * chosen.share
-        now, pulse = formula.at(time), _pulse(laplacian, chosen, chosen.starts(number), cache, progress)
+        now, pulse = formula.at(time), _pulse(laplacian, chosen, chosen.starts(number), progress)
         if pulse is not None:
             added = (areas * (_pushed(now, pulse) - now)) @ modes
             starts, shares = np.append(formula.starts, time), np.concatenate([formula.shares, [added]])
@@ -191,21 +194,21 @@ def in_modes(laplacian, chosen, count, cache, progress) -> InModes:
     return InModes(formula, low, high, last, held / whole, distance)
 
 
-def _reach(laplacian, chosen):
+def _reach(laplacian: Laplacian, chosen: Chosen) -> float:
     """Return how far heat spreads, or waves and fronts run, within all frames."""
     return chosen.distance or {"HEAT": 0.5, "WAVE": 1.0, "FRONT": 1.0}[chosen.kind] * _size(laplacian)
 
 
-def _size(laplacian):
+def _size(laplacian: Laplacian) -> float:
     known = laplacian.component >= 0
     return float(np.linalg.norm(np.ptp(laplacian.points[known], axis=0)))
 
 
-def _width(laplacian, chosen):
+def _width(laplacian: Laplacian, chosen: Chosen) -> float:
     return chosen.width or _WIDTH * float(np.median(laplacian.smoothing_lengths))
 
 
-def _pulse(laplacian, chosen, rows, cache, progress):
+def _pulse(laplacian: Laplacian, chosen: Chosen, rows: Array, progress: Progress) -> Array | None:
     """Return 1 at points, and less around them: one point alone would be less than the points resolve. None for none.
 
     A point that is left out of the operator starts nothing.
@@ -218,35 +221,35 @@ def _pulse(laplacian, chosen, rows, cache, progress):
     return np.exp(-((away / width) ** 2))
 
 
-def _pushed(values, pulse):
+def _pushed(values: Array, pulse: Array) -> Array:
     """Return values that are raised to a pulse where they are less; those below zero only as far as it reaches."""
     return np.maximum(values, pulse + (1.0 - pulse) * np.minimum(values, 0.0))
 
 
-def _heat(laplacian, chosen, cache, progress):
+def _heat(laplacian: Laplacian, chosen: Chosen, progress: Progress) -> tuple[Iterator[Array], float]:
     distance = _reach(laplacian, chosen)
     heat = core.motion.Heat(laplacian, 0.25 * distance * distance * chosen.share, progress=progress)
 
-    def begin(state, number):
-        pulse = _pulse(laplacian, chosen, chosen.starts(number), cache, progress)
+    def begin(state: Any, number: int) -> Any:
+        pulse = _pulse(laplacian, chosen, chosen.starts(number), progress)
         return state if pulse is None else _pushed(state, pulse)
 
     return _advance(heat, np.zeros(len(laplacian.points)), begin, lambda state: state), distance
 
 
-def _wave(laplacian, chosen, cache, progress):
+def _wave(laplacian: Laplacian, chosen: Chosen, progress: Progress) -> tuple[Iterator[Array], float]:
     distance = _reach(laplacian, chosen)
     wave = core.motion.Wave(laplacian, chosen.share, distance, progress=progress)
 
-    def begin(state, number):
-        pulse = _pulse(laplacian, chosen, chosen.starts(number), cache, progress)
+    def begin(state: Any, number: int) -> Any:
+        pulse = _pulse(laplacian, chosen, chosen.starts(number), progress)
         return state if pulse is None else (_pushed(state[0], pulse), state[1])
 
     nothing = np.zeros(len(laplacian.points))
     return _advance(wave, (nothing, nothing), begin, lambda state: state[0]), distance
 
 
-def _reaction(laplacian, chosen, cache, progress):
+def _reaction(laplacian: Laplacian, chosen: Chosen, progress: Progress) -> tuple[Iterator[Array], float]:
     known = laplacian.component >= 0
     resolved = SPOT * float(np.median(laplacian.smoothing_lengths[known]))
     automatic = max(resolved, math.sqrt(float(laplacian.areas[known].sum())) / _ACROSS)
@@ -256,8 +259,8 @@ def _reaction(laplacian, chosen, cache, progress):
     reaction = kind.of_pattern(laplacian, time / steps, chosen.pattern, size, progress=progress)
     chosen = chosen._replace(width=_SEED * size)  # a single point would fade before it reacts
 
-    def begin(state, number):
-        pulse = _pulse(laplacian, chosen, chosen.starts(number), cache, progress)
+    def begin(state: Any, number: int) -> Any:
+        pulse = _pulse(laplacian, chosen, chosen.starts(number), progress)
         if pulse is None:
             return state
         inside = pulse > _EDGE
@@ -267,7 +270,9 @@ def _reaction(laplacian, chosen, cache, progress):
     return _advance(reaction, start, begin, lambda state: state[1], steps), size
 
 
-def _advance(motion, state, begin, part, steps=1):
+def _advance(
+    motion: Any, state: Any, begin: Callable[[Any, int], Any], part: Callable[[Any], Array], steps: int = 1
+) -> Iterator[Array]:
     """Yield a part of the state at each frame, after what begins there."""
     number = 0
     while True:
@@ -278,7 +283,7 @@ def _advance(motion, state, begin, part, steps=1):
         number += 1
 
 
-def _front(laplacian, chosen, cache, progress):
+def _front(laplacian: Laplacian, chosen: Chosen, progress: Progress) -> tuple[Iterator[Array], float]:
     """Frames are 1 behind the front and 0 before it.
 
     A front arrives where the time of a touch and that of the way from there, together, are the least of all touches.
@@ -291,7 +296,7 @@ def _front(laplacian, chosen, cache, progress):
     else:
         far = _reach(laplacian, chosen)
 
-    def frames():
+    def frames() -> Iterator[Array]:
         number, last = 0, far * chosen.share * (chosen.kept - 1)
         while True:
             travelled = far * chosen.share * number
