@@ -15,8 +15,8 @@ _KINDS = {bool: BoolProperty, int: IntProperty, float: FloatProperty, str: Strin
 _SMALL, _DIGITS = 0.01, {"precision": 6}  # defaults of which the usual three digits show little
 
 
-def property_of(setting):
-    """Return the property of Blender for a setting."""
+def property_of(setting, **more):
+    """Return the property of Blender for a setting, with more that it takes."""
     if setting.choices:
         items = list(map(tuple, setting.choices))  # Blender takes no named tuples
         return EnumProperty(name=setting.title, description=setting.description, default=setting.default, items=items)
@@ -29,6 +29,7 @@ def property_of(setting):
         **{name: bound for name, bound in bounds.items() if bound is not None},
         **_FORMS.get(setting.form, {}),
         **(_DIGITS if kind is float and 0.0 < setting.default < _SMALL else {}),
+        **more,
     )
 
 

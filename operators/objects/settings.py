@@ -12,10 +12,11 @@ from bpy.props import (
     StringProperty,
 )
 
-from ...command.settings import LAPLACIAN
+from ...tools.laplacian import LAPLACIAN
 from . import deform_settings, notices, parts
 from .color_choices import color_choice
 from .handlers import notify
+from .properties import property_of, with_properties
 
 
 def _recolor(settings, context):
@@ -54,99 +55,15 @@ class MESHFREE_PG_stage(bpy.types.PropertyGroup):
     seconds: FloatProperty(name="Seconds", description="Time that this stage took, in seconds", min=0.0)
 
 
-class MESHFREE_PG_settings(bpy.types.PropertyGroup):
+class MESHFREE_PG_settings(with_properties(LAPLACIAN.values()), bpy.types.PropertyGroup):
     """Settings and results of the Mesh-Free Laplacian for one object"""
 
-    # What results depend on. Names and defaults are those of core's options.
-    laplacian: EnumProperty(
-        name="Method",
-        items=(
-            ("DEFAULT", "Default", "For scans: adaptive bandwidths, with corrections for curvature and boundary"),
-            ("PAPER", "Paper", "As in the paper: one bandwidth for all points, no boundary, no corrections"),
-        ),
-        **LAPLACIAN["laplacian"].keywords,
-    )
-    bandwidth: EnumProperty(
-        name="Bandwidth",
-        items=(
-            ("ADAPTIVE", "Adaptive", "By the widest gaps between the points around it"),
-            ("LOCAL", "Local", "By the spacing of the points alone"),
-            ("GLOBAL", "Global", "The same for all points: for even samples"),
-        ),
-        **LAPLACIAN["bandwidth"].keywords,
-    )
-    neighbors: IntProperty(
-        name="Neighbors",
-        soft_max=200,
-        **LAPLACIAN["neighbors"].keywords,
-    )
-    bandwidth_factor: FloatProperty(
-        name="Bandwidth Factor",
-        soft_min=0.3,
-        soft_max=2.0,
-        step=5,
-        **LAPLACIAN["bandwidth_factor"].keywords,
-    )
-    normals: EnumProperty(
-        name="Normals",
-        items=(
-            ("WPCA", "Weighted Plane", "From a plane through the neighbors, near ones counting more"),
-            ("PCA", "Plain Plane", "From a plane through the neighbors, all counting alike"),
-        ),
-        **LAPLACIAN["normals"].keywords,
-    )
-    areas: EnumProperty(
-        name="Areas",
-        items=(
-            ("REGULARIZED", "Regularized", "Least squares with regularization, equation 7 of the paper"),
-            ("CONSTRAINED", "Constrained", "The same with positive areas only, equation 8 of the paper"),
-            ("UNIFORM", "Uniform", "The mean area for every point: only for even samples"),
-        ),
-        **LAPLACIAN["areas"].keywords,
-    )
-    regularization: FloatProperty(
-        name="Regularization",
-        soft_max=1.0,
-        precision=6,
-        **LAPLACIAN["regularization"].keywords,
-    )
-    boundary: EnumProperty(
-        name="Boundary",
-        items=(
-            ("AUTO", "Automatic", "Detect the boundary points, and reflect the surface across the boundary"),
-            ("OFF", "Off (Closed Surface)", "Treat the surface as closed"),
-        ),
-        **LAPLACIAN["boundary"].keywords,
-    )
-    sheets: BoolProperty(
-        name="Keep Close Sheets Apart",
-        **LAPLACIAN["sheets"].keywords,
-    )
-    projection: EnumProperty(
-        name="Noise",
-        items=(
-            ("AUTO", "Automatic", "Smooth if the measured noise requires it"),
-            ("OFF", "Off", "Use the points as they are"),
-            ("QUADRIC", "Always", "Project each point onto a quadric fitted to its neighbors"),
-        ),
-        **LAPLACIAN["projection"].keywords,
-    )
-    denoise: BoolProperty(
-        name="Tangent Planes",
-        **LAPLACIAN["denoise"].keywords,
-    )
-    boundary_group: StringProperty(
-        name="Boundary Group",
-        **LAPLACIAN["boundary_group"].keywords,
-    )
+    # What else results depend on.
+    bandwidth_factor: property_of(LAPLACIAN["bandwidth_factor"], step=5)
     use_modifiers: BoolProperty(
         name="Use Modifiers",
         description="Read the points after the modifiers, which must keep their number and order",
         default=False,
-    )
-    leave_out_floaters: BoolProperty(
-        name="Leave Out Floaters",
-        **LAPLACIAN["leave_out_floaters"].keywords,
     )
     point_budget: EnumProperty(
         name="Point Budget",
