@@ -43,9 +43,6 @@ class ThinOut(PointTool):
     def adjustable(self, own: Any) -> tuple[str, ...]:
         return self.asks(own)
 
-    def writes(self, own: Any) -> tuple[str, ...]:
-        return ()
-
     def compute(self, points: Array, inputs: Any, own: Any, progress: Progress) -> Any:
         """Return which points stay, (n,) bool, and the least distance between them, or None if that is not known."""
         least = (own.spacing or _SPACINGS * core.geometry.typical_distance(points)) or None

@@ -203,9 +203,6 @@ class PointTool(AnyTool[Array]):
 class MovingTool(Tool):
     """A tool that moves the points, and has no results at them."""
 
-    def writes(self, own: Any) -> tuple[str, ...]:
-        return ()
-
     def shown(self, own: Any) -> str:
         return ""
 
