@@ -75,11 +75,6 @@ def fitting(count: int, options, modes: int = 0):
     return core.points_that_fit(width, modes)
 
 
-def result(laplacian, name, *settings, compute):
-    """Return the result of a function without arguments that uses an operator, which keeps it."""
-    return laplacian.kept.result(name, compute, *settings)
-
-
 def fetch(key, compute):
     """Return the value of a key, computed by a function and kept if there is none."""
     value = _get(key)
