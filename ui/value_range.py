@@ -25,7 +25,7 @@ def fit_range(
         whose ends would not meet otherwise, and PERCENTILE for all else.
     coverage : float
         Percentage of the values between the percentiles, so that a few outliers do not dominate; all of them
-        for truth values and of stepped maps, and where it is not a number.
+        for truth values, few whole numbers and of stepped maps, and where it is not a number.
     locked : tuple of float
         Range to keep.
     from_zero : bool
@@ -43,9 +43,10 @@ def fit_range(
         return "TRUTH", 0.0, 1.0
     values = values[np.isfinite(values)].astype(np.float64)
     ends = (values.min(), values.max()) if len(values) else (0.0, 1.0)
-    if name == "AUTO" and kind == "i" and len(values) and ends[0] >= -1 and ends[1] < CLASSES:
+    few = kind == "i" and len(values) > 0 and ends[0] >= -1 and ends[1] < CLASSES
+    if name == "AUTO" and few:
         name = "CATEGORICAL"
-    every = kind == "b" or name in STEPPED or np.isnan(coverage)  # Blender takes NaN for any number
+    every = kind == "b" or few or name in STEPPED or np.isnan(coverage)  # Blender takes NaN for any number
     outside = 0.0 if every else 0.5 * (100.0 - coverage)
     share = np.percentile(values, (outside, 100.0 - outside)) if len(values) else ends
     if share[0] == share[1]:  # most values are equal: show the few others

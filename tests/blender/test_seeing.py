@@ -57,7 +57,7 @@ def test_maps_by_name_change_the_colors_at_once(colormaps, display, obj, name):
 
 def test_changes_are_edits_of_values_and_compute_nothing(display, obj, monkeypatch):
     monkeypatch.setattr(part("operators.running.cache"), "build", None)
-    monkeypatch.setattr(part("operators.running.cache"), "lowest_modes", None)
+    monkeypatch.setattr(part("core").LaplaceBeltrami, "eigenpairs", None)
     material = display.find_material(obj)
     before = {node.name: node.as_pointer() for node in material.node_tree.nodes}
     for name, value in DISPLAY_SETTINGS.items():
