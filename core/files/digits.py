@@ -9,7 +9,8 @@ from ..types import Array, Floats, Ints
 
 _WHOLE = 2**31  # of a whole number of Blender, 32 bits with a sign
 _EXACT = 2**53  # beyond this, doubles are no longer all whole numbers
-LARGEST_SINGLE, SMALLEST_SINGLE = float(np.finfo(np.float32).max), float(np.finfo(np.float32).tiny)
+LARGEST_SINGLE = float(np.finfo(np.float32).max)
+SMALLEST_SINGLE = float(np.finfo(np.float32).tiny)
 _MOST_DECIMALS = 9  # that are looked for, and ...
 _MEANT = 6  # ... that numbers have because they were measured so; more come out of a computation
 _SINGLE = 9  # digits with which single precision is written
