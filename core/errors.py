@@ -10,7 +10,7 @@ class InvalidPointsError(PointCloudError):
 
 
 class TooFewPointsError(PointCloudError):
-    """Fewer points than the neighbourhoods, or the question, need."""
+    """Fewer points than the neighborhoods, or the question, need."""
 
 
 class NotASurfaceError(PointCloudError):

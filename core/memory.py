@@ -10,13 +10,13 @@ from .control_groups import groups_of, number_in
 from .errors import NotEnoughMemoryError
 from .options import LaplacianOptions
 
-# Bytes for each neighbour of a point, at the peak of a build: resident memory of builds of 50,000 points of a sphere,
-# beyond that before, with 40, 116 and 230 neighbours a point (3.6, 6.4 and 11.4 kB a point; of 150,000 random points,
+# Bytes for each neighbor of a point, at the peak of a build: resident memory of builds of 50,000 points of a sphere,
+# beyond that before, with 40, 116 and 230 neighbors a point (3.6, 6.4 and 11.4 kB a point; of 150,000 random points,
 # 54 and 156 take 3.7 and 7.7 kB).
 _PER_NEIGHBOR = 42
-_ALONE = 43  # neighbours that would take as much as what each point needs for itself
+_ALONE = 43  # neighbors that would take as much as what each point needs for itself
 _PER_MODE = 70  # bytes a point for each mode beyond that: 50 and 400 modes took 3.4 and 28 kB a point
-ADAPTIVE = 60.0  # neighbours in "adaptive" kernels on random points, which have the most
+ADAPTIVE = 60.0  # neighbors in "adaptive" kernels on random points, which have the most
 _SHARE = 0.8  # of the free memory, to leave some for other programs
 # Files of a control group, of versions 2 and 1: the limit, what is taken, and which of that are cached files.
 _GROUPS = (

@@ -32,12 +32,12 @@ class LaplacianOptions:
         "local", "global": the smoothing length is measured by the distance to this neighbor. Where a component has no
         more points than that it is extrapolated from the last one.
     bandwidth_factor : float
-        "local", "global": h in units of the distance to the neighbour named above. "adaptive": factor on
+        "local", "global": h in units of the distance to the neighbor named above. "adaptive": factor on
         the narrowest length, which is wider where the points ask for it. The radius of the kernel is 3 h.
     boundary : {"auto", "off"}
         "auto": detect the boundary, unless it is given, and mirror the points there. "off": take the surface as closed.
     sheets : bool
-        Keep points of close sheets, such as the two sides of a thin wall, from being neighbours.
+        Keep points of close sheets, such as the two sides of a thin wall, from being neighbors.
     projection : {"auto", "off", "quadric"}
         Move the points that serve the operator, not the caller's, onto local quadrics: where the measured noise asks
         for it, never, or always.
@@ -45,7 +45,7 @@ class LaplacianOptions:
     Raises
     ------
     PointCloudError
-        An unknown choice, a number out of range, or a kernel that is too narrow for its neighbours.
+        An unknown choice, a number out of range, or a kernel that is too narrow for its neighbors.
 
     See Also
     --------
@@ -54,7 +54,7 @@ class LaplacianOptions:
 
     Examples
     --------
-    Half the distance to the 100th neighbour as the smoothing length, here about ``2 sqrt(100 / 800) / 2``:
+    Half the distance to the 100th neighbor as the smoothing length, here about ``2 sqrt(100 / 800) / 2``:
 
     >>> import numpy as np
     >>> import meshfree_laplacian as mf
@@ -114,7 +114,7 @@ class PaperOptions:
 
     @property
     def cloud(self) -> LaplacianOptions:
-        """One h, the mean distance to that neighbour, without boundary, separation of sheets, or denoising."""
+        """One h, the mean distance to that neighbor, without boundary, separation of sheets, or denoising."""
         return LaplacianOptions(
             bandwidth="global", neighbors=self.neighbors, boundary="off", sheets=False, projection="off"
         )

@@ -143,7 +143,7 @@ def _single(matrix: sparse.csr_array) -> sparse.csr_array:
 
 
 def aggregates(matrix: Rows, diagonal: Floats, share: float, report: Report) -> tuple[Ints, Ints]:
-    """Divide the unknowns of a matrix into neighbourhoods of roots, of which no two couple strongly.
+    """Divide the unknowns of a matrix into neighborhoods of roots, of which no two couple strongly.
 
     Returns
     -------

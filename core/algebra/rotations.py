@@ -16,7 +16,7 @@ def nearest_rotations(matrices: Floats) -> Floats:
     Parameters
     ----------
     matrices : ndarray, (3, 3, n)
-        The last index counts the matrices. Any units; they may be singular, such as those of flat neighbourhoods.
+        The last index counts the matrices. Any units; they may be singular, such as those of flat neighborhoods.
 
     Returns
     -------
@@ -27,7 +27,7 @@ def nearest_rotations(matrices: Floats) -> Floats:
     -----
     With S = U diag(s1, s2, s3) V^T, U and V proper, s3 of either sign, the rotation sought is U V^T. The matrix of
     cofactors has the same U and V and the values s2 s3, s1 s3, s1 s2, so S + cof(S) / s1 has the values
-    s1 + s2 s3 / s1, s2 + s3 and s3 + s2: no longer singular for flat neighbourhoods, and never reflected. Its polar
+    s1 + s2 s3 / s1, s2 + s3 and s3 + s2: no longer singular for flat neighborhoods, and never reflected. Its polar
     factor is then found by scaled Newton steps, X <- (c X + X^-T / c) / 2, in a few dozen vectorised operations
     instead of n singular value decompositions; the few matrices for which they fail are decomposed.
 

@@ -23,7 +23,7 @@ _TOLERANCE = 1e-5  # of the factors: the coordinates are large next to the spaci
 _NOISE = 1.25  # mean squares of the smoothing lengths: time that removes the noise of single points
 DETAIL = 9.0  # smoothing lengths of a wavelength below which details count as roughness
 _EXACT = 1e-8  # error of roughness, as a share of the smoothing length, however large the cloud is against that
-_AROUND = 4  # neighbours along the boundary that a boundary point is joined to
+_AROUND = 4  # neighbors along the boundary that a boundary point is joined to
 
 
 @ends_at_one
@@ -374,7 +374,7 @@ def _base(laplacian: LaplaceBeltrami, dirichlet: bool, progress: Progress | None
         force = pull @ np.where(laplacian.near_boundary[:, None], boundary - base, 0.0)
         coupled = connected_components(stiffness, directed=False)[1]
         rows = np.flatnonzero(known & np.isin(coupled, coupled[pull.diagonal() > 0.0]))
-        rows = rows[cKDTree(points[rows]).indices]  # neighbours near in memory make the products faster
+        rows = rows[cKDTree(points[rows]).indices]  # neighbors near in memory make the products faster
         base[rows] += solve_symmetric(stiffness[rows][:, rows], force[rows], progress=progress)
     return base
 
@@ -392,7 +392,7 @@ def _centers(laplacian: LaplaceBeltrami, weights: Floats) -> Floats:
 def boundary_places(laplacian: LaplaceBeltrami) -> Floats:
     """Return the nearest position on the boundary of points near one, (n, 3) [L]; elsewhere the points themselves.
 
-    The boundary is straight from each boundary point to its neighbours on the boundary, moved outwards by the distance
+    The boundary is straight from each boundary point to its neighbors on the boundary, moved outwards by the distance
     that the operator assumes: of random points, those at the boundary lie a little inside.
     """
     places = laplacian.points.copy()

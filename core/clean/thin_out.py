@@ -175,7 +175,7 @@ def _away(points: Floats, rows: Ints, chosen: Ints, distance: float) -> Ints:
 
 
 def _by_passes(points: Floats, chosen: Ints, order: Ints, area: float, distance: float, report: Report) -> Ints:
-    """Choose some of the points so by passes of growing distances, so that each looks at few neighbours."""
+    """Choose some of the points so by passes of growing distances, so that each looks at few neighbors."""
     fewest = max(1.0, _DISCS * area / distance**2)
     passes = max(1, int(np.ceil(np.log(max(len(points) / fewest, 1.0)) / np.log(_STEP**2))))
     for step in range(passes):

@@ -8,12 +8,12 @@ from ..types import Floats, Ints
 
 _AROUND = 9  # nearest points of the boundary among which those before and after a point are sought
 _OPPOSITE = -0.3  # cosine between the directions to both, at most
-_ROUGH = 0.07  # median height of points over the line between their neighbours, in units of its length
+_ROUGH = 0.07  # median height of points over the line between their neighbors, in units of its length
 _ROUNDS = 3  # of Newton's iteration for the foot
 
 
 class BoundaryCurve:
-    """Parabolas through each point of a boundary and its two neighbours along it.
+    """Parabolas through each point of a boundary and its two neighbors along it.
 
     Parameters
     ----------

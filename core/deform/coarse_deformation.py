@@ -264,7 +264,7 @@ def _spacing(areas: Floats, lengths: Floats, component: Ints, count: int) -> Flo
 def _linear_weights(sources: Floats, points: Floats, report: Callable[[float], None]) -> sparse.csr_array:
     """Return the matrix that carries values from sources to points, exact for constants and, along surfaces, linear.
 
-    Weights fade to zero at the last neighbour, so that none appears or vanishes suddenly, and rise at the sources, so
+    Weights fade to zero at the last neighbor, so that none appears or vanishes suddenly, and rise at the sources, so
     that these keep their values, times a linear function that balances them around the point (moving least squares).
     """
     found, indices = [], []

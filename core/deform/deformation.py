@@ -128,7 +128,7 @@ class Deformer(HandleSolver):
     The deformed points x minimise ``sum_i areas_i |(L x)_i - R_i (L x_o)_i|^2`` over all positions in which handles and
     anchors are where they should be. L x_o are the differential coordinates of the points at rest x_o: mean curvature
     times normal. Without rotations (R_i = I) this is linear in the positions of the handles. The rotation-aware mode
-    estimates R_i from the neighbourhood of each point before and after, and solves again, until nothing moves: details
+    estimates R_i from the neighborhood of each point before and after, and solves again, until nothing moves: details
     then rotate with the surface.
 
     Parameters
@@ -146,7 +146,7 @@ class Deformer(HandleSolver):
         weight of one pulls as strongly as the surface around resists the move of that point alone. Infinity is a hard
         constraint, as all are by default; a weight of zero removes the constraint.
     neighbors : int
-        Neighbours inside the kernel of the narrower operator.
+        Neighbors inside the kernel of the narrower operator.
     progress : callable, optional
         Called as ``progress(stage, fraction)`` at the beginning of each stage; may raise `Cancelled`.
 

@@ -12,7 +12,7 @@ from ..operator import LaplaceBeltrami
 from ..types import Bools, Floats
 
 _FAINT = 1e-3  # share of the sum of weights that its area implies below which a point counts as coupled to none
-_ROUND = 0.05  # share of the smaller extent of a neighbourhood, squared, in both: a half where it is round
+_ROUND = 0.05  # share of the smaller extent of a neighborhood, squared, in both: a half where it is round
 
 
 class DeformationGradients:
@@ -138,7 +138,7 @@ def coupled(laplacian: LaplaceBeltrami) -> Bools:
 
 
 def sums_over_steps(products: sparse.csr_array, points: Floats) -> Floats:
-    """Return the sums over neighbours of w_ij (x_j - x_i)(p_j - p_i)^T, (3, 3, m), p the points at rest.
+    """Return the sums over neighbors of w_ij (x_j - x_i)(p_j - p_i)^T, (3, 3, m), p the points at rest.
 
     Parameters
     ----------

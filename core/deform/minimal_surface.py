@@ -29,7 +29,7 @@ _SURPLUS = 0.01  # of the tolerance: the area that may still be saved when the i
 _GAIN = 0.5  # of the area that may still be saved, after a step of Newton that is not lost in noise, at most
 _FREE_EDGE = 4.0  # spacings from fixed points to points of a free edge
 _ON_CURVE = 0.5  # spacings from the boundary's curve to its points, at most
-_LOPSIDED = 0.2  # mean offset of the neighbours over their mean distance at a boundary, at least
+_LOPSIDED = 0.2  # mean offset of the neighbors over their mean distance at a boundary, at least
 _RTOL, _PRODUCTS = 1e-6, 500  # of the linear solves
 
 
@@ -386,7 +386,7 @@ def _boundary_points(laplacian: LaplaceBeltrami, fixed: Bools) -> Ints:
         foot, _ = BoundaryCurve(points[sure]).nearest(points[rows])
         away = np.linalg.norm(points[rows] - foot, axis=1)
         return rows[away < _ON_CURVE * nearest.spacing[rows]]
-    # No boundary was found there: the fixed points are one if they have neighbours on one side only.
+    # No boundary was found there: the fixed points are one if they have neighbors on one side only.
     offset = points[nearest.index[rows]] - points[rows, None]
     mean = np.linalg.norm(np.einsum("ik,ikc->ic", nearest.weight[rows], offset), axis=1)
     lopsided = mean > _LOPSIDED * np.einsum("ik,ik->i", nearest.weight[rows], nearest.distance[rows])

@@ -11,7 +11,7 @@ from ..geometry import arc_ahead, dots
 from ..operator import LaplaceBeltrami, tangent_frames
 from ..types import Array, Bools, Floats, Ints
 
-_DIRECTIONS = 32  # of a fan: the nearest neighbour in each
+_DIRECTIONS = 32  # of a fan: the nearest neighbor in each
 _OPEN = 0.75 * np.pi  # angle of a triangle at its point, at most
 _ASTRAY = 0.5  # angle that a shortest path over pairs leads off the geodesic's direction, at most
 _FLAT = 1e-2  # of the sum of squares, by which a front is rather a circle
@@ -20,9 +20,9 @@ _BLOCK = 1 << 15  # pairs worked on at one time, so that they stay in the cache
 
 
 class Fans:
-    """Triangles of every point and two neighbours next to each other in direction, in geodesic polar coordinates.
+    """Triangles of every point and two neighbors next to each other in direction, in geodesic polar coordinates.
 
-    Where points lie in rows, neighbours are in few directions, and every path along pairs zigzags. A front that passes
+    Where points lie in rows, neighbors are in few directions, and every path along pairs zigzags. A front that passes
     a triangle comes from one place in its plane, which follows from when it passed two corners; so it is as exact in
     all directions, and exact in the plane.
 
@@ -31,7 +31,7 @@ class Fans:
     laplacian : LaplaceBeltrami
         Of n points.
     lengths : csr_array, (n, n)
-        Symmetric: of the arcs between neighbours [L].
+        Symmetric: of the arcs between neighbors [L].
     report : callable
         Called now and then; may raise `Cancelled`.
     """
@@ -214,7 +214,7 @@ def _fan(
     angle = np.arctan2(y, x)
     nearest = np.full(count, np.inf)
     np.minimum.at(nearest, own, length)
-    # Counted from the nearest neighbour, so that they turn with the points.
+    # Counted from the nearest neighbor, so that they turn with the points.
     zero = np.zeros(count)
     first = length == nearest[own]
     zero[own[first]] = angle[first]

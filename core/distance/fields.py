@@ -17,7 +17,7 @@ from ..types import Bools, Floats, Ints, Progress
 
 _MEAN = 1e-2  # of the source's mean size: a larger mean is intended, a smaller one is an error of the quadrature
 _DEEP = 0.6  # share of a point's weights that lead to fixed points, where it lies deep inside a set of them
-_NARROW = 60  # neighbours of the narrow operator: fewer are too noisy at random points, more leak more
+_NARROW = 60  # neighbors of the narrow operator: fewer are too noisy at random points, more leak more
 # Distances from thin sets, in units of h, between which the narrow operator is blended into the wide one.
 _NEAR = 1.5, 3.0
 _LEAST = 2e-3  # share of the wide operator everywhere: it connects what the narrow one does not
@@ -75,7 +75,7 @@ def solve_poisson(
 
     A set of fixed points may be any band, line, or single points. Values past the edge of a band continue those before
     it linearly (as in Morris, Fox, Zhu, 1997), which makes weights across the edge larger: none becomes negative, so
-    that the maximum principle holds. Near sets thinner than the kernel, one of more than 60 neighbours is
+    that the maximum principle holds. Near sets thinner than the kernel, one of more than 60 neighbors is
     blended with a narrow one.
 
     References
@@ -116,7 +116,7 @@ def solve_poisson(
     free = np.flatnonzero(known & ~is_fixed)
     if not len(free):
         return result
-    free = free[cKDTree(laplacian.points[free]).indices]  # neighbours near in memory make the products faster
+    free = free[cKDTree(laplacian.points[free]).indices]  # neighbors near in memory make the products faster
     load = laplacian.areas[free] * source[free]
     if inside.any():
         matrix, pull = _with_fixed_points(laplacian, inside, np.where(is_fixed, result, 0.0), free, report)
@@ -308,7 +308,7 @@ def _weights(laplacian: LaplaceBeltrami, fixed: Bools, values: Floats) -> tuple[
 def _edge_distance(laplacian: LaplaceBeltrami, fixed: Bools, spacing: Floats) -> Floats:
     """Return how far points are from the edge between fixed and free points, halfway between them, (n,).
 
-    Zero for points that have no neighbours on the other side.
+    Zero for points that have no neighbors on the other side.
     """
     free = np.flatnonzero(~fixed)
     across = laplacian.stiffness[np.flatnonzero(fixed)][:, free].tocoo()

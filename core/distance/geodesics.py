@@ -66,7 +66,7 @@ def geodesic_distance(
 
     The shortest path (Dijkstra, 1959) over all pairs of the operator, each as long as the circular arc through both
     points with their normals, tells in which order a front from the sources reaches the points, and nearly when. The
-    front then passes the triangles of every point and two neighbours next to each other in direction, as in fast
+    front then passes the triangles of every point and two neighbors next to each other in direction, as in fast
     marching (Kimmel, Sethian, 1998); it is a circle there around a source that the distances of both corners tell
     (Novotni, Klein, 2002), or straight where they are reached from different ones. So distances are exact in the plane,
     however much denser points lie in one direction than in another, and off by 0.03 to 0.05 % in the mean on the unit
@@ -308,7 +308,7 @@ def signed_distance(
     laplacian : LaplaceBeltrami
         Of n points.
     curve : array_like, (k,) int
-        The points of the curve in their order, at least two. Points that are not neighbours are joined by the shortest
+        The points of the curve in their order, at least two. Points that are not neighbors are joined by the shortest
         path between them.
     closed : bool
         Whether the last point is joined with the first.
@@ -405,7 +405,7 @@ def _lengths_of_pairs(laplacian: LaplaceBeltrami, report: Callable[[], None]) ->
         kept[block.start + doubtful] = away < _FILLED * radius[nearest] + height
 
     on_all_cores(measure, blocks(len(first), _BLOCK), report)
-    arcs = np.maximum(arcs, 1e-300)  # coincident points are neighbours too
+    arcs = np.maximum(arcs, 1e-300)  # coincident points are neighbors too
 
     def upper(chosen: slice | Bools) -> sparse.csr_array:
         start = np.concatenate([[0], np.cumsum(np.bincount(first[chosen], minlength=count))])

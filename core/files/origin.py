@@ -38,7 +38,7 @@ def look_like_degrees(points: Floats) -> bool:
 
 
 def _steps(points: Floats) -> Floats:
-    """Distance of neighbouring numbers of single precision at the largest coordinate of each axis, (3,)."""
+    """Distance of neighboring numbers of single precision at the largest coordinate of each axis, (3,)."""
     return np.spacing(np.abs(points).max(axis=0).astype(np.float32)).astype(np.float64)
 
 

@@ -1,4 +1,4 @@
-"""Measurements on the points: neighbourhoods, components, normals, boundary, pairs; `cloud` runs the stages."""
+"""Measurements on the points: neighborhoods, components, normals, boundary, pairs; `cloud` runs the stages."""
 
 from .agreed import Agreed, Decisions
 from .arcs import arc_length

@@ -20,7 +20,7 @@ def arc_length(cloud: Cloud) -> Floats:
     ----------
     cloud : Cloud
         Of m points, with p pairs. The second normal is flipped to the first one's side, pair by pair, by the normals of
-        all neighbours: signs do not matter.
+        all neighbors: signs do not matter.
 
     Returns
     -------

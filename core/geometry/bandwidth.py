@@ -17,7 +17,7 @@ from .quadrics import Quadrics
 _NARROWEST = 1.08  # h over the radius of the cells
 _WIDER = 1.3  # each width that is tried over the last one
 _BENT = 0.02  # relative error by a surface that bends within the kernel, by its squared curvatures times h^2
-_STEPS = 4  # to the neighbours' neighbours: how far away a point looks for the deepest place
+_STEPS = 4  # to the neighbors' neighbors: how far away a point looks for the deepest place
 
 
 def smoothing_lengths(
@@ -46,15 +46,15 @@ def smoothing_lengths(
     options : LaplacianOptions
         Its bandwidth, neighbors and bandwidth_factor.
     component : ndarray, (m,) int, optional
-        Component of each point; neighbours are counted within one.
+        Component of each point; neighbors are counted within one.
     decisions : Decisions, optional
         Of the one length of "global".
 
     Returns
     -------
     ndarray, (m,)
-        Global: the mean distance to the n-th neighbour, everywhere the same. Local: each point's own distance, averaged
-        twice over the 40 nearest neighbours so that h varies slowly within a support. Adaptive: as narrow as the points
+        Global: the mean distance to the n-th neighbor, everywhere the same. Local: each point's own distance, averaged
+        twice over the 40 nearest neighbors so that h varies slowly within a support. Adaptive: as narrow as the points
         and the shape let it be. It starts from 1.08 times the radius of the cells around, in the eighth mean, times the
         factor: the width of a gap in one direction decides, not the number of points in the others. Where a wider
         kernel would meet its moments better by more than the bend of the surface costs it, it is wider. Even points
@@ -129,7 +129,7 @@ def depth(nearest: Nearest, inside: Floats) -> Floats:
 
 
 def neighbor_distance(tree: cKDTree, neighbors: int, component: Ints | None) -> Floats:
-    """Return how far the n-th neighbour of every point is, (m,); in components of fewer points, how far it would be.
+    """Return how far the n-th neighbor of every point is, (m,); in components of fewer points, how far it would be.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def neighbor_distance(tree: cKDTree, neighbors: int, component: Ints | None) -> 
     neighbors : int
     component : ndarray, (m,) int, optional
     """
-    # The tree counts a point as its own first neighbour.
+    # The tree counts a point as its own first neighbor.
     distance: Floats = tree.query(tree.data, k=[min(neighbors + 1, tree.n)], workers=cores())[0][:, 0]
     if component is not None:
         size = np.bincount(component)

@@ -19,7 +19,7 @@ from .quadrics import chords, eighths, frames, in_plane
 from .sheets import on_sheet
 
 _BLOCK = 1 << 13  # points looked at at one time
-_ANGLE = np.radians(100.0)  # widest angle without a neighbour, at least
+_ANGLE = np.radians(100.0)  # widest angle without a neighbor, at least
 PROBE, _EMPTY = 8.0, 0.6  # no point within 0.6 of 8 gaps of the place 8 gaps further out
 HOLE = _EMPTY * PROBE  # gaps: radius of holes that are none by chance, whatever their shape
 _REACH = 20.0  # spacings from a boundary at which no kernel sees it
@@ -119,8 +119,8 @@ def no_boundary(count: int) -> Boundary:
 def find_boundary(nearest: Nearest, oriented: Floats, gaps: Floats) -> Bools:
     """Find the points at which the surface ends.
 
-    Candidates are points around which the directions of the neighbours leave a wide gap, and far into which there is
-    nothing. Where neighbours lie off a point's sheet or face elsewhere, the surface does not end but goes on past an
+    Candidates are points around which the directions of the neighbors leave a wide gap, and far into which there is
+    nothing. Where neighbors lie off a point's sheet or face elsewhere, the surface does not end but goes on past an
     edge. Candidates that could not surround the empty place before them are dropped, as chance.
 
     Parameters
@@ -149,7 +149,7 @@ def find_boundary(nearest: Nearest, oriented: Floats, gaps: Floats) -> Bools:
         angle = np.sort(np.where(known, np.arctan2(flat[1, :, 1:], flat[0, :, 1:]), np.nan), axis=1)
         around = np.concatenate([angle, angle[:, :1] + 2.0 * np.pi], axis=1)
         gap = np.fmax.reduce(np.diff(around, axis=1), axis=1)
-        # Neighbours left out sort last, as NaN: the gap over the end is counted from the last known angle.
+        # Neighbors left out sort last, as NaN: the gap over the end is counted from the last known angle.
         gap = np.fmax(gap, angle[:, 0] + 2.0 * np.pi - np.fmax.reduce(angle, axis=1))
         return block[open_[gap > _ANGLE]]
 
@@ -180,7 +180,7 @@ def _surrounded(flat: Floats, known: Bools) -> Bools:
 
 
 def _bends_away(nearest: Nearest, oriented: Floats, rows: Ints) -> Bools:
-    """Tell around which points neighbours lie off their sheet or face elsewhere: it goes on there, past an edge."""
+    """Tell around which points neighbors lie off their sheet or face elsewhere: it goes on there, past an edge."""
     cosine = np.einsum("ikc,ic->ik", oriented[nearest.index[rows]], oriented[rows])
     beside = nearest.apart[rows]
     near = slice(FEW)  # on coarse balls those further away lie behind
@@ -195,7 +195,7 @@ def _label_courses(points: Floats, reach: Floats) -> Ints:
 
 
 def outward_directions(nearest: Nearest, normals: Floats, rows: Ints) -> Floats:
-    """Return unit vectors in the tangent planes of some points, away from their neighbours, (k, 3)."""
+    """Return unit vectors in the tangent planes of some points, away from their neighbors, (k, 3)."""
     offset = nearest.points[nearest.index[rows]] - nearest.points[rows, None]
     return _tangents(-np.einsum("ik,ikc->ic", nearest.weight[rows], offset), normals[rows])
 

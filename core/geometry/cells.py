@@ -54,14 +54,14 @@ def measure_cells(
 ) -> Cells:
     """Measure the cell of every point in geodesic polar coordinates around it.
 
-    A neighbour at the distance d cuts the plane at d / 2; next to a boundary the cell ends there. On a surface of
+    A neighbor at the distance d cuts the plane at d / 2; next to a boundary the cell ends there. On a surface of
     Gaussian curvature K the cut is a geodesic: in gnomonic coordinates, ``tan(sqrt(K) r) / sqrt(K)``, it is a straight
     line, and an area is 2 (1 - (1 + K R^2)^(-1/2)) / (K R^2) of what it is in the plane.
 
     Parameters
     ----------
     nearest : Nearest
-        Of m points. Neighbours on other sheets cut nothing. Where the nearest ones leave a cell open, more of them are
+        Of m points. Neighbors on other sheets cut nothing. Where the nearest ones leave a cell open, more of them are
         looked at; cells that stay open end a spacing away.
     normals : ndarray, (m, 3)
         Unit normals of any sign.
@@ -87,7 +87,7 @@ def measure_cells(
     else:
         cells = Cells(before.areas.copy(), before.radius.copy(), before.corner.copy())
         rows = np.flatnonzero(boundary.distance[:, 0] < np.maximum(nearest.distance[:, -1], before.radius))
-    whole = ~np.any(nearest.apart, axis=1)  # no neighbour was left out: more of them can close a cell
+    whole = ~np.any(nearest.apart, axis=1)  # no neighbor was left out: more of them can close a cell
     spacing = nearest.spacing
     # Few points close most cells; more are looked at while one is open, as a jump of density has them on one side.
     for many in (COUNT // 2 + 1, COUNT, 4 * COUNT, 16 * COUNT):
@@ -99,7 +99,7 @@ def measure_cells(
             areas, corner, closed = _intersect(cuts, gaussian_curvature[block], 0.5 * furthest)
             known = np.flatnonzero(closed)
             if many == COUNT and not closed.all():
-                # Where a cell has no neighbour it ends one spacing off, as far as those of random points.
+                # Where a cell has no neighbor it ends one spacing off, as far as those of random points.
                 gaps = np.flatnonzero(~closed)
                 capped = np.concatenate([cuts[gaps], _caps(cuts[gaps], 1.0 / spacing[block[gaps]])], axis=1)
                 areas[gaps], corner[gaps], _ = _intersect(capped, gaussian_curvature[block[gaps]], np.inf)
@@ -123,7 +123,7 @@ def _cuts(
     many: int,
     sides: Sides | None,
 ) -> tuple[Floats, Floats]:
-    """Return the cuts of some points by so many neighbours, (k, cuts, 2), and how far away the last of these is.
+    """Return the cuts of some points by so many neighbors, (k, cuts, 2), and how far away the last of these is.
 
     A cut is the vector across it, as long as one over its distance; one that does not count is zero.
     """

@@ -50,7 +50,7 @@ _NARROW = 0.6  # h over the depth of the surface that is too wide
 
 @dataclass(frozen=True)
 class Surface:
-    """A sample, and a quadric through the neighbours of each point on its own sheet; others weigh nothing there.
+    """A sample, and a quadric through the neighbors of each point on its own sheet; others weigh nothing there.
 
     `sheets` is how these were separated; None where close sheets are not kept apart.
     """
@@ -61,7 +61,7 @@ class Surface:
 
     @property
     def mixed(self) -> Quadrics:
-        """The quadrics through all neighbours, whatever their sheet."""
+        """The quadrics through all neighbors, whatever their sheet."""
         return self.quadrics if self.sheets is None else self.sheets.mixed
 
 
@@ -94,9 +94,9 @@ class Cloud:
     disc_radii : ndarray, (m,)
         Of discs to be drawn: `disc_radii`.
     spacing : ndarray, (m,)
-        Distance between neighbouring points.
+        Distance between neighboring points.
     misfit : ndarray, (m,)
-        Root mean square distance of the neighbours from the quadric.
+        Root mean square distance of the neighbors from the quadric.
     squared_slope : ndarray, (m,)
         Mean squared slope of the roughness that is finer than the normals resolve; zero where it is noise.
     cause : ndarray, (m,) int
@@ -159,7 +159,7 @@ def read_cloud(
     Raises
     ------
     PointCloudError
-        No sound neighbourhoods.
+        No sound neighborhoods.
     """
     report = progress or (lambda stage, fraction: None)
     report("Normals", 0.0)
@@ -316,7 +316,7 @@ def read_surface(
 
 
 def gather(scaled: ScaledPoints, decisions: Decisions) -> Sample:
-    """Find the neighbours of all distinct points."""
+    """Find the neighbors of all distinct points."""
     count = len(scaled.points)
     smoothed = smooth_rounded(find_nearest(scaled.points), functools.partial(decisions.settle, "rounded"))
     nearest, noise = look_across_rows(smoothed.nearest), smoothed.noise
@@ -324,7 +324,7 @@ def gather(scaled: ScaledPoints, decisions: Decisions) -> Sample:
 
 
 def leave_outliers(scaled: ScaledPoints, report: Report = lambda: None, decisions: Decisions | None = None) -> Sample:
-    """Leave out distinct points that do not lie on the surface of their neighbours.
+    """Leave out distinct points that do not lie on the surface of their neighbors.
 
     Parameters
     ----------
@@ -381,9 +381,9 @@ def divide_components(sample: Sample) -> Sample:
 
 
 def fit_surface(sample: Sample, sheets: bool, before: Surface | None = None, changed: Bools | None = None) -> Surface:
-    """Fit a quadric around every point, to the neighbours of its own sheet if close sheets are to be kept apart.
+    """Fit a quadric around every point, to the neighbors of its own sheet if close sheets are to be kept apart.
 
-    `before` is the surface of the same points before some of them, and neighbours of others, `changed`.
+    `before` is the surface of the same points before some of them, and neighbors of others, `changed`.
 
     Returns
     -------
@@ -399,15 +399,15 @@ def fit_surface(sample: Sample, sheets: bool, before: Surface | None = None, cha
 
 
 def with_scatter(surface: Surface) -> Surface:
-    """Return the same surface, with what quadrics miss the neighbours of each point by before noise is smoothed."""
+    """Return the same surface, with what quadrics miss the neighbors of each point by before noise is smoothed."""
     scatter = mean_misfits(surface.sample.nearest, surface.mixed.misfit, surface.quadrics.misfit)
     return replace(surface, sample=replace(surface.sample, scatter=scatter))
 
 
 def remove_noise(surface: Surface, options: LaplacianOptions, near: Floats | None = None) -> Surface:
-    """Move points onto the surface that their neighbours describe, where the options or the noise ask for it.
+    """Move points onto the surface that their neighbors describe, where the options or the noise ask for it.
 
-    Each round measures again only points that the last one moved, and their neighbours. The first one takes
+    Each round measures again only points that the last one moved, and their neighbors. The first one takes
     `near_misfit`, (m,), if that is known.
 
     Returns
@@ -441,7 +441,7 @@ def remove_noise(surface: Surface, options: LaplacianOptions, near: Floats | Non
 
 
 def measure_noise(surface: Surface, near: Floats) -> Floats:
-    """Return the noise of all points, (m,), by what quadrics through 20 neighbours miss these by: `noise_level`."""
+    """Return the noise of all points, (m,), by what quadrics through 20 neighbors miss these by: `noise_level`."""
     return noise_level(surface.sample.nearest, near, surface.mixed.misfit, surface.quadrics.misfit)
 
 
@@ -454,13 +454,13 @@ def _roughly(surface: Surface, noise: Floats, filling: Bools, rounds: int) -> Fl
 
 
 def _project(surface: Surface, noise: Floats, moving: Bools) -> tuple[Surface, Bools]:
-    """Move some points onto quadrics through their neighbours.
+    """Move some points onto quadrics through their neighbors.
 
     Returns
     -------
     Surface
     ndarray, (m,) bool
-        Points that have moved, or have neighbours that did.
+        Points that have moved, or have neighbors that did.
     """
     sample, nearest = surface.sample, surface.sample.nearest
     smallest = sample.decisions.settle("smallest", lambda: int(np.bincount(sample.component).min()))

@@ -7,7 +7,7 @@ from scipy.sparse.csgraph import connected_components
 from ..types import Bools, Floats, Ints
 from .nearest import COUNT, NEXT, Nearest
 
-_GAP = 2.0  # an edge longer than this many reaches to the 8th neighbour is a gap: more join clumps of outliers
+_GAP = 2.0  # an edge longer than this many reaches to the 8th neighbor is a gap: more join clumps of outliers
 
 
 def even_reach(nearest: Nearest) -> Floats:
@@ -19,7 +19,7 @@ def even_reach(nearest: Nearest) -> Floats:
 def gap_reach(nearest: Nearest) -> Floats:
     """Return the edge that is a gap, (m,), by the distance of the nearest eight, or in rows by how many there are.
 
-    Where the nearest eight lie along a row, but the neighbours do not, none of these lies across a gap.
+    Where the nearest eight lie along a row, but the neighbors do not, none of these lies across a gap.
     """
     reach = _GAP * nearest.distance[:, 1 : NEXT + 1][:, -1]  # of eight points there are seven neighbors
     rows = nearest.beside_rows
@@ -30,7 +30,7 @@ def gap_reach(nearest: Nearest) -> Floats:
 def label_components(nearest: Nearest, usual: float | None = None) -> Ints:
     """Number the components of the cloud, which gaps separate.
 
-    Points are joined to their forty neighbours, as points may crowd along lines, except over gaps far wider than the
+    Points are joined to their forty neighbors, as points may crowd along lines, except over gaps far wider than the
     spacing at the nearer end; components of some size are joined over gaps that are no wider than the spacing of the
     sparser one would let expect.
 
@@ -44,7 +44,7 @@ def label_components(nearest: Nearest, usual: float | None = None) -> Ints:
     Returns
     -------
     ndarray, (m,) int
-        The largest component is 0. Those of fewer points than a neighbourhood has, 41, which get no operator, are -1.
+        The largest component is 0. Those of fewer points than a neighborhood has, 41, which get no operator, are -1.
     """
     index = nearest.index[:, 1:]
     usual = float(np.median(gap_reach(nearest))) if usual is None else usual
@@ -55,7 +55,7 @@ def label_components(nearest: Nearest, usual: float | None = None) -> Ints:
 
 
 def find_gaps(nearest: Nearest, usual: float) -> tuple[Bools, Bools]:
-    """Tell which edges to neighbours, (m, 40) bool, are no gaps, and which are none between components of some size."""
+    """Tell which edges to neighbors, (m, 40) bool, are no gaps, and which are none between components of some size."""
     index, distance, reach = nearest.index[:, 1:], nearest.distance[:, 1:], gap_reach(nearest)
     strict = distance <= np.maximum(np.minimum(reach[:, None], reach[index]), usual)
     return strict, distance <= np.maximum(reach[:, None], reach[index])
@@ -69,9 +69,9 @@ def number_large(label: Ints, large: Bools) -> Ints:
 
 
 def label_connected(index: Ints, joined: Bools) -> Ints:
-    """Number the components of points whose neighbours, (m, k) int, are joined to them, (m, k) bool."""
+    """Number the components of points whose neighbors, (m, k) int, are joined to them, (m, k) bool."""
     label = np.arange(len(index), dtype=np.int32)
-    # The nearest neighbours make few components, so that hardly a step to the others is left that joins two.
+    # The nearest neighbors make few components, so that hardly a step to the others is left that joins two.
     for some in (slice(0, NEXT), slice(NEXT, None)):
         row, column = np.nonzero(joined[:, some] & (label[index[:, some]] != label[:, None]))
         ends = label[row], label[index[row, some.start + column]]
@@ -95,7 +95,7 @@ def number_sizes(size: Ints, smallest: int) -> Ints:
 
 
 def move_apart(points: Floats, component: Ints) -> Floats:
-    """Move components so far from each other that no search finds neighbours in another one; nothing else changes."""
+    """Move components so far from each other that no search finds neighbors in another one; nothing else changes."""
     if component.max() == 0:
         return points
     moved = points.copy()

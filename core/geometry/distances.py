@@ -1,4 +1,4 @@
-"""Distances between neighbours along the surface, from their normals."""
+"""Distances between neighbors along the surface, from their normals."""
 
 from collections.abc import Callable
 
@@ -76,7 +76,7 @@ def circle_arc(chord: Floats, sine: Floats) -> Floats:
 
 
 def measure_squared_slope(nearest: Nearest, normals: Floats) -> Floats:
-    """Measure the slopes between neighbouring points that are too fine for the normals, which are fitted to many.
+    """Measure the slopes between neighboring points that are too fine for the normals, which are fitted to many.
 
     Parameters
     ----------
@@ -88,9 +88,9 @@ def measure_squared_slope(nearest: Nearest, normals: Floats) -> Floats:
     Returns
     -------
     ndarray, (m,)
-        Mean square of the slope of the chords to the eight nearest neighbours against the mean normal of their ends,
-        averaged over the neighbourhood. Of fourth order in the spacing on a smooth surface. Sharp edges, where normals
-        change too fast between neighbours to be right, do not count: arcs make up for them already.
+        Mean square of the slope of the chords to the eight nearest neighbors against the mean normal of their ends,
+        averaged over the neighborhood. Of fourth order in the spacing on a smooth surface. Sharp edges, where normals
+        change too fast between neighbors to be right, do not count: arcs make up for them already.
     """
     near = slice(1, NEXT + 1)
     index, counted = nearest.index[:, near], nearest.weight[:, near] > 0.0

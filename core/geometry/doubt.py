@@ -1,4 +1,4 @@
-"""Why results are in doubt where they are: what the neighbours of a point look like."""
+"""Why results are in doubt where they are: what the neighbors of a point look like."""
 
 from dataclasses import replace
 from enum import IntEnum
@@ -10,7 +10,7 @@ from .cells import Cells
 from .nearest import ON, ROUNDS, Nearest, fading_weights, repeated
 from .noise import FILLING
 
-_OWN = 0.5  # share of what a quadric misses all neighbours by, that one through the own sheet misses it by at most
+_OWN = 0.5  # share of what a quadric misses all neighbors by, that one through the own sheet misses it by at most
 _AGREED = 0.8  # mean squared cosine of normals, by which they belong to one smooth surface
 _LONG = 5.0  # circle around a cell over its area: that of rectangles six times as long as wide, of random points 3.3
 
@@ -25,7 +25,7 @@ class Doubt(IntEnum):
     FEW
         The points are too few for how much the surface bends, or for how fast their density changes.
     VOLUME
-        The neighbours fill a volume and lie on no surface, as in vegetation, or where details are finer than the
+        The neighbors fill a volume and lie on no surface, as in vegetation, or where details are finer than the
         spacing.
     NOISE
         They lie around a surface, but are off it by about the spacing.
@@ -76,15 +76,15 @@ def likely_causes(nearest: Nearest, normals: Floats, cells: Cells, scatter: Floa
     cells : Cells
         Of the points.
     scatter : ndarray, (2, m)
-        What quadrics through all neighbours, and through those of the own sheet, missed them by before noise was
+        What quadrics through all neighbors, and through those of the own sheet, missed them by before noise was
         smoothed, in spacings: from `mean_misfits`.
 
     Returns
     -------
     ndarray, (m,) int
-        Of `Doubt`. No shape is missed by more than `FILLING`: where all neighbours are, but those of the own sheet are
+        Of `Doubt`. No shape is missed by more than `FILLING`: where all neighbors are, but those of the own sheet are
         not, there are several sheets; otherwise noise, if the normals agree once it is smoothed, and no surface if they
-        do not. Where the neighbours lie on a surface, these are rows, if cells are long and narrow, or too few points.
+        do not. Where the neighbors lie on a surface, these are rows, if cells are long and narrow, or too few points.
     """
     missed, own = scatter
     filling = missed > FILLING

@@ -1,4 +1,4 @@
-"""Edges: the normal and the bend of the smooth side that each point lies on, from neighbours on that side alone."""
+"""Edges: the normal and the bend of the smooth side that each point lies on, from neighbors on that side alone."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Sides:
     sharp : ndarray, (m,)
         How sure it is that an edge is near, from 0 to 1. At zero, normal and bend are those of the quadric.
     around : ndarray, (m, 3)
-        Unit normals of the quadrics through all neighbours, towards the same side of the surface: across an edge, too,
+        Unit normals of the quadrics through all neighbors, towards the same side of the surface: across an edge, too,
         they tell whether two points see the same one.
     """
 
@@ -62,12 +62,12 @@ def one_side(quadrics: Quadrics, normals: Floats) -> Sides:
 
 
 def find_sides(nearest: Nearest, quadrics: Quadrics) -> Sides:
-    """Fit quadrics again where they miss their neighbours, to those whose normals agree, until normals turn no more.
+    """Fit quadrics again where they miss their neighbors, to those whose normals agree, until normals turn no more.
 
     Across an edge normals differ more and more with each such fit, on each side they agree; where the surface is round
     or noisy the fit stays much the same. A point next to the edge may end between both sides: in the end it takes the
-    normal of the neighbour whose quadric fits best, to this point and to that neighbour's own side. How sure
-    an edge is follows from what is left of the misfit, by as many neighbours as it has more than coefficients.
+    normal of the neighbor whose quadric fits best, to this point and to that neighbor's own side. How sure
+    an edge is follows from what is left of the misfit, by as many neighbors as it has more than coefficients.
 
     Parameters
     ----------
@@ -99,12 +99,12 @@ def find_sides(nearest: Nearest, quadrics: Quadrics) -> Sides:
 def _refit(
     nearest: Nearest, quadrics: Quadrics, found: Quadrics, beside: bool, rows: Ints
 ) -> tuple[Bools, Quadrics, Floats]:
-    """Fit quadrics to those neighbours of some points whose last normals agree with theirs, or with one beside them.
+    """Fit quadrics to those neighbors of some points whose last normals agree with theirs, or with one beside them.
 
     Returns
     -------
     ndarray, (k,) bool
-        Which of the points have enough such neighbours.
+        Which of the points have enough such neighbors.
     Quadrics
         Of these points.
     ndarray, (k,)

@@ -13,7 +13,7 @@ from .quadrics import along, chords, frames, gathered
 from .sheets import on_sheet
 
 TERMS = 5  # of a point: trace of the second moment, first moment (2), the rest of the second (2)
-_MORE = 64, 160  # neighbours looked at where the kernel holds more than 40; beyond, any sampling is dense enough
+_MORE = 64, 160  # neighbors looked at where the kernel holds more than 40; beyond, any sampling is dense enough
 LARGEST = 2.0  # change of the logarithm of a weight: where more is needed the moments cannot be met
 _STEPS = 8  # of Newton's method
 MET = 2e-3  # relative error of the moments that is small enough, for a kernel, and for a ridge under the terms
@@ -91,7 +91,7 @@ def least_error(
             else:
                 distance, index = nearest.tree.query(nearest.points[asked], k=min(most, len(normals)))
             found[open_] = solve(asked, distance[:, 1:], index[:, 1:])
-            # More neighbours can only meet the moments better.
+            # More neighbors can only meet the moments better.
             more = (distance[:, -1] <= SUPPORT * lengths[asked]) & (len(normals) > most) & (found[open_] > MET)
             open_ = open_[more]
             if not len(open_):
@@ -99,7 +99,7 @@ def least_error(
         found[open_] = 0.0
 
     def solve(rows: Ints, distance: Floats, index: Ints) -> Floats:
-        """Return the least error of some points with these neighbours."""
+        """Return the least error of some points with these neighbors."""
         lengths_here = lengths[rows, None]
         within = slice(np.count_nonzero(distance < SUPPORT * lengths_here, axis=1).max())
         distance, index = distance[:, within], index[:, within]

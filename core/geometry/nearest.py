@@ -1,4 +1,4 @@
-"""The nearest neighbours of every point: a fixed number, before any smoothing length is known."""
+"""The nearest neighbors of every point: a fixed number, before any smoothing length is known."""
 
 from __future__ import annotations
 
@@ -13,35 +13,35 @@ from ..cores import cores
 from ..types import Bools, Floats, Ints
 from .quadrics import Quadrics, chords, covariance, fit_quadrics, roundness
 
-COUNT = 41  # the point itself and 40 others, so that a component has an operator if its neighbourhoods lie within it
+COUNT = 41  # the point itself and 40 others, so that a component has an operator if its neighborhoods lie within it
 NEXT = 8  # nearest of them: as many as there are directions in which a sheet or a row goes on
-AGREEING = 3  # neighbours that say the same are believed: there are as many faces at a corner; fewer may be chance
-FEW = 12  # neighbours that a spacing, a quadric or a parabola follows from at least
-ENOUGH = 24  # neighbours from which five or six numbers follow, with some freedom left
-ROUNDS = 9  # of averaging over neighbours, after which values vary with the place and not from point to point
+AGREEING = 3  # neighbors that say the same are believed: there are as many faces at a corner; fewer may be chance
+FEW = 12  # neighbors that a spacing, a quadric or a parabola follows from at least
+ENOUGH = 24  # neighbors from which five or six numbers follow, with some freedom left
+ROUNDS = 9  # of averaging over neighbors, after which values vary with the place and not from point to point
 POWER = 8  # of a mean that its greatest values decide
 ON = 0.3  # spacings from a surface within which a point lies on it
 SMOOTH = 0.7  # cosine between normals of one smooth sheet, or between directions across one boundary, at least
 GAP = 2.5  # times the usual that a gap may be wide, as in rows 25 times denser along than across: else it is a hole
 ROW = 0.2  # roundness of the nearest points of a row: ten times denser along than across, and of the nearest eight
-_MEASURED = 100_000  # points whose neighbours are searched for in a tenth of a second
+_MEASURED = 100_000  # points whose neighbors are searched for in a tenth of a second
 
 
 @dataclass(frozen=True)
 class Nearest:
-    """The 40 nearest neighbours of every point.
+    """The 40 nearest neighbors of every point.
 
     Attributes
     ----------
     tree : cKDTree
         Of m points; components stand far apart in it.
     index : ndarray, (m, 41) int
-        Neighbours by distance, the point itself first.
+        Neighbors by distance, the point itself first.
     distance : ndarray, (m, 41)
     weight : ndarray, (m, 41)
-        From 1 at the point to 0 at its last neighbour; 0 too for neighbours on another sheet of the surface.
+        From 1 at the point to 0 at its last neighbor; 0 too for neighbors on another sheet of the surface.
     in_row : ndarray, (m,) bool
-        Points that crowd along a row, so that their neighbours are not simply the nearest: see `look_across_rows`.
+        Points that crowd along a row, so that their neighbors are not simply the nearest: see `look_across_rows`.
     """
 
     tree: cKDTree
@@ -57,35 +57,35 @@ class Nearest:
 
     @functools.cached_property
     def spacing(self) -> Floats:
-        """Distance between points of an even sample as dense as the nearest twelve neighbours, (m,)."""
+        """Distance between points of an even sample as dense as the nearest twelve neighbors, (m,)."""
         return spacing_of(self.distance)
 
     @functools.cached_property
     def apart(self) -> Bools:
-        """Which neighbours were left out, as they lie on another sheet, (m, 41) bool."""
+        """Which neighbors were left out, as they lie on another sheet, (m, 41) bool."""
         return (self.weight == 0.0) & (fading_weights(self.distance) > 0.0)
 
     @functools.cached_property
     def quadrics(self) -> Quadrics:
-        """A quadric around every point through its neighbours, fitted once: `Quadrics`."""
+        """A quadric around every point through its neighbors, fitted once: `Quadrics`."""
         return fit_quadrics(self.points, self.index, self.weight)
 
     def with_quadrics(self, quadrics: Quadrics) -> Nearest:
-        """Return the same neighbours with quadrics that were fitted already."""
+        """Return the same neighbors with quadrics that were fitted already."""
         result = replace(self)
         vars(result)["quadrics"] = quadrics
         return result
 
     def keep(self, kept: Bools) -> Nearest:
-        """Return the same neighbours with the weight of those not kept, (m, 41) bool, set to zero.
+        """Return the same neighbors with the weight of those not kept, (m, 41) bool, set to zero.
 
-        A quadric has six coefficients: a point that would keep fewer than a dozen neighbours keeps all of them.
+        A quadric has six coefficients: a point that would keep fewer than a dozen neighbors keeps all of them.
         """
         few = np.count_nonzero(kept & (self.weight > 0.0), axis=1) < FEW
         return replace(self, weight=np.where(kept | few[:, None], self.weight, 0.0))
 
     def along_row(self, rows: Ints) -> Bools:
-        """Tell of which of some points, (k,) int, the nearest eight neighbours lie along a row, (k,) bool."""
+        """Tell of which of some points, (k,) int, the nearest eight neighbors lie along a row, (k,) bool."""
         index = self.index[rows, : NEXT + 1]
         even = np.full(index.shape, 1.0 / index.shape[1])
         lined: Bools = roundness(np.linalg.eigvalsh(covariance(chords(self.points, rows, index), even))) < ROW
@@ -93,17 +93,17 @@ class Nearest:
 
     @functools.cached_property
     def beside_rows(self) -> Bools:
-        """Points whose nearest eight neighbours lie along a row, but the others beside it, (m,) bool; found once."""
+        """Points whose nearest eight neighbors lie along a row, but the others beside it, (m,) bool; found once."""
         result: Bools = self.quadrics.roundness > ROW
         result[result] = self.along_row(np.flatnonzero(result))
         return result
 
     def across(self, component: Ints) -> Bools:
-        """Tell which points have neighbours of another component than their own, (m,) bool, by those, (m,) int."""
+        """Tell which points have neighbors of another component than their own, (m,) bool, by those, (m,) int."""
         return (component[self.index] != component[:, None]).any(axis=1)
 
     def renewed(self, points: Floats, changed: Bools, kept: Bools | None = None) -> Nearest:
-        """Return the neighbours of the same points at other places, searched for only where they may be others.
+        """Return the neighbors of the same points at other places, searched for only where they may be others.
 
         Quadrics that are known stay so, and are fitted again there.
 
@@ -130,7 +130,7 @@ class Nearest:
         return result.with_quadrics(self.quadrics.take(np.flatnonzero(kept)).put(rows, fitted))
 
     def averaging(self) -> sparse.csr_array:
-        """Return the (m, m) CSR matrix whose product is the weighted mean over the neighbours."""
+        """Return the (m, m) CSR matrix whose product is the weighted mean over the neighbors."""
         count, width = self.index.shape
         weight = self.weight / self.weight.sum(axis=1, keepdims=True)
         start = np.arange(0, count * width + 1, width, dtype=np.int32)
@@ -145,22 +145,22 @@ def repeated(averaging: sparse.csr_array, values: Floats, rounds: int) -> Floats
 
 
 def find_nearest(points: Floats) -> Nearest:
-    """Find the 40 nearest neighbours of every point, (m, 3)."""
+    """Find the 40 nearest neighbors of every point, (m, 3)."""
     tree = cKDTree(points)
     distance, index = tree.query(points, k=min(COUNT, len(points)), workers=cores())
     return Nearest(tree, index.astype(np.int32), distance, fading_weights(distance), np.zeros(len(points), dtype=bool))
 
 
 def spacing_of(distance: Floats) -> Floats:
-    """Return the spacing of an even sample as dense as the nearest twelve neighbours, by their distances (n, k)."""
+    """Return the spacing of an even sample as dense as the nearest twelve neighbors, by their distances (n, k)."""
     last = min(FEW, distance.shape[1] - 1)
     return distance[:, last] * np.sqrt(np.pi / last)
 
 
 def fading_weights(distance: Floats) -> Floats:
-    """Return weights that fall from 1 to 0 at the last neighbour, (n, k).
+    """Return weights that fall from 1 to 0 at the last neighbor, (n, k).
 
-    Which of several neighbours at the same last distance was found then makes no difference. Only where nearly all of
+    Which of several neighbors at the same last distance was found then makes no difference. Only where nearly all of
     them are that far, such as around the pole of circles of latitude, all count alike.
     """
     weights = distance / distance[:, -1:]
@@ -173,9 +173,9 @@ def fading_weights(distance: Floats) -> Floats:
 
 
 def typical_distance(positions: Floats) -> float:
-    """Return the typical distance between neighbouring points of a surface, (n, 3); 0 if unknown.
+    """Return the typical distance between neighboring points of a surface, (n, 3); 0 if unknown.
 
-    The 8 nearest neighbours of a point at distance d fill a disc of pi d^2, so that each takes pi d^2 / 8. Of very many
+    The 8 nearest neighbors of a point at distance d fill a disc of pi d^2, so that each takes pi d^2 / 8. Of very many
     points some are measured, chosen at random, each of which takes as much more as they are fewer.
     """
     positions = positions[np.isfinite(positions).all(axis=1)]

@@ -1,4 +1,4 @@
-"""Noise: its measure around every point, and points moved onto the surface that their neighbours describe."""
+"""Noise: its measure around every point, and points moved onto the surface that their neighbors describe."""
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -10,15 +10,15 @@ from .quadrics import fit_quadrics
 
 _SHAPE = 1.6  # a fit to 40 that misses so much more: noise misses both nearly alike, an edge by their distance
 _LEAST = 0.02  # noise below this share of the spacing is left alone
-LEFT = 0.08  # of the spacing: scatter about a fit that counts as none; it shrinks with the root of its neighbours
-FILLING = 0.4  # noise above this share fills the neighbourhoods as a volume would
+LEFT = 0.08  # of the spacing: scatter about a fit that counts as none; it shrinks with the root of its neighbors
+FILLING = 0.4  # noise above this share fills the neighborhoods as a volume would
 FALLING = 0.9  # share of noise that a round leaves, at most: .3 of one spacing, .86 of three, all of leaves in a volume
-LARGEST = 90  # neighbours of the fit that points are projected on, at most: more would round the shape
+LARGEST = 90  # neighbors of the fit that points are projected on, at most: more would round the shape
 _BLOCK = 1 << 12  # points projected at one time
 
 
 def near_misfit(nearest: Nearest, rows: Ints | None = None) -> Floats:
-    """Return how far quadrics through 20 neighbours miss these, of all m points or of some rows, (k,)."""
+    """Return how far quadrics through 20 neighbors miss these, of all m points or of some rows, (k,)."""
     rows = np.arange(len(nearest.points)) if rows is None else rows
     part = slice(COUNT // 2 + 1)  # with the point itself
     weight = fading_weights(nearest.distance[rows, part])
@@ -26,7 +26,7 @@ def near_misfit(nearest: Nearest, rows: Ints | None = None) -> Floats:
 
 
 def mean_misfits(nearest: Nearest, *misfits: Floats) -> Floats:
-    """Return the geometric means of misfits of quadrics over the neighbourhood, in spacings.
+    """Return the geometric means of misfits of quadrics over the neighborhood, in spacings.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def mean_misfits(nearest: Nearest, *misfits: Floats) -> Floats:
     Returns
     -------
     ndarray, (k, m)
-        Of the k given ones. An edge that runs through a neighbourhood has little weight.
+        Of the k given ones. An edge that runs through a neighborhood has little weight.
     """
     averaging = nearest.averaging()
     logarithms = np.log(np.maximum(np.stack(misfits, axis=1) / nearest.spacing[:, None], 1e-12))
@@ -53,15 +53,15 @@ def noise_level(nearest: Nearest, near: Floats, mixed: Floats, misfit: Floats) -
     nearest : Nearest
         Of m points.
     near, mixed, misfit : ndarray, (m,)
-        Of quadrics through 20 neighbours, through 40, and through those of 40 that lie on the point's own sheet: where
+        Of quadrics through 20 neighbors, through 40, and through those of 40 that lie on the point's own sheet: where
         the last is much less, there are several sheets and no noise.
 
     Returns
     -------
     ndarray, (m,)
-        The misfit of a quadric through 20 neighbours; zero where it is next to nothing, or where a quadric through
+        The misfit of a quadric through 20 neighbors; zero where it is next to nothing, or where a quadric through
         40 fits so much worse that it is shape, not noise, that it misses. No shape is missed by as much as `FILLING`.
-        All are `mean_misfits`: an edge that runs through the neighbourhood is no noise. The majority of the neighbours
+        All are `mean_misfits`: an edge that runs through the neighborhood is no noise. The majority of the neighbors
         decides.
     """
     few, many, own = mean_misfits(nearest, near, mixed, misfit)
@@ -70,7 +70,7 @@ def noise_level(nearest: Nearest, near: Floats, mixed: Floats, misfit: Floats) -
 
 
 def project_points(tree: cKDTree, rows: Ints, noise: Floats, smallest: int | None = None) -> Floats:
-    """Move some points onto quadrics through their neighbours.
+    """Move some points onto quadrics through their neighbors.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def project_points(tree: cKDTree, rows: Ints, noise: Floats, smallest: int | Non
     rows : ndarray, (k,) int
         Which points to move.
     noise : ndarray, (m,)
-        As a share of the spacing: little noise needs few neighbours.
+        As a share of the spacing: little noise needs few neighbors.
     smallest : int, optional
         Points of the smallest component; there is one if not given.
 
@@ -91,7 +91,7 @@ def project_points(tree: cKDTree, rows: Ints, noise: Floats, smallest: int | Non
     # A quadric has six coefficients.
     asked = np.clip(6.0 * (noise[rows] / LEFT) ** 2, ENOUGH, LARGEST)
     many = np.minimum(asked.astype(int), smallest - 1)
-    order = np.argsort(many, kind="stable")  # those who ask for few neighbours do not wait for others' many
+    order = np.argsort(many, kind="stable")  # those who ask for few neighbors do not wait for others' many
     result = np.empty((len(rows), 3))
 
     def project(part: slice) -> None:

@@ -40,7 +40,7 @@ def unit_normals(normals: ArrayLike, count: int) -> Floats:
 
 
 def orient_outwards(nearest: Nearest, normals: Floats) -> Floats:
-    """Flip normals so that neighbours agree, outwards where the cloud encloses a volume.
+    """Flip normals so that neighbors agree, outwards where the cloud encloses a volume.
 
     Parameters
     ----------
@@ -131,9 +131,9 @@ def _seen_by_sums(sums: Floats) -> tuple[Floats, Floats, Bools, Bools]:
 
 
 def propagate_signs(nearest: Nearest, normals: Floats) -> tuple[Floats, sparse.csr_array]:
-    """Flip normals so that neighbours agree.
+    """Flip normals so that neighbors agree.
 
-    The sign travels along a minimum spanning tree of the neighbour graph, whose edges cost least where a circular arc
+    The sign travels along a minimum spanning tree of the neighbor graph, whose edges cost least where a circular arc
     joins both points best (Hoppe, DeRose, Duchamp, McDonald, Stuetzle 1992). Along an arc the second normal is the
     mirror image of the first in the plane halfway between the points, which holds across sharp edges too.
 
@@ -174,7 +174,7 @@ def propagate_signs(nearest: Nearest, normals: Floats) -> tuple[Floats, sparse.c
 
 
 def near_edges(nearest: Nearest) -> tuple[Ints, Ints]:
-    """Return the edges from every point to its nearest neighbours on its own sheet, by both ends."""
+    """Return the edges from every point to its nearest neighbors on its own sheet, by both ends."""
     near = slice(1, NEIGHBORS + 1)
     same = nearest.weight[:, near] > 0.0
     first = np.repeat(np.arange(len(same), dtype=np.int32), np.count_nonzero(same, axis=1))

@@ -36,7 +36,7 @@ def orient_normals(
     normals : array_like, (n, 3)
         Of any length and sign.
     method : {"winding", "outside", "viewpoint"}
-        'outside' lets neighbours agree and each connected part point away from its middle, or up along z where it is a
+        'outside' lets neighbors agree and each connected part point away from its middle, or up along z where it is a
         sheet that hardly bulges nor overhangs, such as terrain; 'viewpoint' lets patches look to where they were seen
         from, of one place by the points that are not hidden from it; 'winding' decides patch by patch so that the
         winding number is as close to constant off the surface as it can be, which holds in noise and where parts of
@@ -44,7 +44,7 @@ def orient_normals(
     viewpoint : array_like, (3,) or (n, 3), optional
         For 'viewpoint': one place, or the place of the scanner for each point [L].
     areas : array_like, (n,), optional
-        For 'winding' and 'viewpoint': areas of the points [L^2]; from the distances of neighbours where not given.
+        For 'winding' and 'viewpoint': areas of the points [L^2]; from the distances of neighbors where not given.
 
     Returns
     -------
@@ -56,7 +56,7 @@ def orient_normals(
     InvalidPointsError
         Normals, viewpoints or areas that do not fit the points, are not finite, or no area above zero; another method.
     PointCloudError
-        The points have no sound neighbourhoods; see `build_laplacian`.
+        The points have no sound neighborhoods; see `build_laplacian`.
 
     See Also
     --------
@@ -65,7 +65,7 @@ def orient_normals(
 
     Notes
     -----
-    Links between neighbours over which the sign is beyond doubt join points to patches, within which all normals agree.
+    Links between neighbors over which the sign is beyond doubt join points to patches, within which all normals agree.
     What remains is a sign for each patch. The double layer of all patches, of areas a and normals n, has the energy
 
     .. math:: E = \\sum_{ij} \\frac{a_i a_j}{4 \\pi} \\left( \\frac{n_i \\cdot n_j}{r^3}
@@ -195,7 +195,7 @@ def _near_energies(place: Floats, nearest: Nearest, normals: Floats, weight: Flo
 def _settled(energy: sparse.csr_array) -> Floats:
     """Return signs, (m,), from which no flip of one point improves the energy of pairs, (m, m) CSR without empty rows.
 
-    In each round those points flip that gain most among their neighbours, no two of which are neighbours.
+    In each round those points flip that gain most among their neighbors, no two of which are neighbors.
     """
     sign = np.ones(energy.shape[0])
     least = 1e-9 * (abs(energy) @ sign)  # below it a gain may be one of rounding

@@ -1,4 +1,4 @@
-"""Outliers: points that do not lie on the surface of their neighbours."""
+"""Outliers: points that do not lie on the surface of their neighbors."""
 
 import numpy as np
 
@@ -8,20 +8,20 @@ from .nearest import AGREEING, GAP, ON, Nearest
 from .noise import FILLING
 from .quadrics import Quadrics, fit_quadrics, heights_over
 
-# Neighbours asked: near ones, and some further away, where the density may be another.
+# Neighbors asked: near ones, and some further away, where the density may be another.
 _WITNESSES = np.array([1, 2, 3, 5, 7, 9, 12, 16, 20, 24, 30, 36])
-SCATTERS = 3.0  # standard deviations of the witness' own neighbours more than that are on its surface, too
+SCATTERS = 3.0  # standard deviations of the witness' own neighbors more than that are on its surface, too
 _BLOCK = 1 << 13  # points looked at at one time
 
 
 def find_outliers(nearest: Nearest, usual: float | None = None) -> Bools:
-    """Find points that lie off the surfaces of nearly all of their neighbours.
+    """Find points that lie off the surfaces of nearly all of their neighbors.
 
-    Twelve neighbours are the witnesses of a point. Each of them describes the surface by a quadric through its own
-    neighbours, without those that turn out to lie off it. The point is on the surface where three of these pass nearer
-    than a share of its spacing and the scatter of the witness' own neighbours. (The spacing of a point far off is half
+    Twelve neighbors are the witnesses of a point. Each of them describes the surface by a quadric through its own
+    neighbors, without those that turn out to lie off it. The point is on the surface where three of these pass nearer
+    than a share of its spacing and the scatter of the witness' own neighbors. (The spacing of a point far off is half
     its distance from the surface, so that the rule holds at any height.) Outliers are no witnesses; nor are, for sparse
-    points, those whose neighbours fill a volume.
+    points, those whose neighbors fill a volume.
 
     Parameters
     ----------
@@ -52,18 +52,18 @@ def find_outliers(nearest: Nearest, usual: float | None = None) -> Bools:
 
 
 class Alone:
-    """The quadrics of points without the neighbours off them, fitted where they are asked for, and kept."""
+    """The quadrics of points without the neighbors off them, fitted where they are asked for, and kept."""
 
     def __init__(self, nearest: Nearest, surface: Quadrics) -> None:
         count = len(nearest.points)
         self.surface, self.scatter, self._known = surface, np.zeros(count), np.zeros(count, dtype=bool)
 
     def forget(self, rows: Ints) -> None:
-        """Fit those of some points, whose neighbours are others now, anew when they are asked for."""
+        """Fit those of some points, whose neighbors are others now, anew when they are asked for."""
         self._known[rows] = False
 
     def fit(self, nearest: Nearest, surface: Quadrics, rows: Ints) -> None:
-        """Fit those of some points, (k,) int, that are not known, from quadrics through all their neighbours."""
+        """Fit those of some points, (k,) int, that are not known, from quadrics through all their neighbors."""
         rows = rows[~self._known[rows]]
         fitted, self.scatter[rows] = _let_go(nearest, surface, rows)
         self.surface = self.surface.put(rows, fitted)
@@ -121,7 +121,7 @@ def heights_over_witnesses(nearest: Nearest, surface: Quadrics, rows: Ints) -> F
 
 
 def _let_go(nearest: Nearest, surface: Quadrics, rows: Ints) -> tuple[Quadrics, Floats]:
-    """Fit the quadrics of some points, (k,) int, again without the neighbours off them, and measure how these scatter.
+    """Fit the quadrics of some points, (k,) int, again without the neighbors off them, and measure how these scatter.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The neighbour pairs inside the kernel's support."""
+"""The neighbor pairs inside the kernel's support."""
 
 import functools
 from collections.abc import Callable, Sequence
@@ -18,7 +18,7 @@ from .patches import Patch, divide_pairs
 
 Ends: TypeAlias = Sequence[Sequence[Floats]] | Floats  # quantities of pairs at their first and second points
 
-_BLOCK = 1 << 22  # neighbour candidates held at one time while the pairs are collected
+_BLOCK = 1 << 22  # neighbor candidates held at one time while the pairs are collected
 _GROUPS = 4  # of points with as many candidates, for each doubling of these
 
 

@@ -16,18 +16,18 @@ from .subset import voxel_numbers
 
 _NEIGHBORS = 9  # of the subset around each point
 _BLOCK = 1 << 14  # points worked on at one time
-_CELLS = 64  # along the longest side of the cloud: points go cell by cell, so that neighbours are near in memory
+_CELLS = 64  # along the longest side of the cloud: points go cell by cell, so that neighbors are near in memory
 _STEEP = 10.0  # how much farther than along the surface a point of the subset counts as lying, across it
 _CLOSE = 1e-6  # of the reach: a point of the subset takes its own value
-_LEVEL = 1e-3  # of the scatter of the neighbours, below which they lie in a row
-_BEYOND = 2.0  # scatters beyond the middle of the neighbours up to which values go on in their slope
+_LEVEL = 1e-3  # of the scatter of the neighbors, below which they lie in a row
+_BEYOND = 2.0  # scatters beyond the middle of the neighbors up to which values go on in their slope
 
 
 class Prolongation:
     """Carries areas, functions and labels from a subset of points to all of them, along the surface.
 
     Each point belongs to the point of the subset that is nearest, steps across the surface counting ten times, so that
-    close sheets stay apart. Functions are interpolated from that one and its neighbours of the same sheet: moving least
+    close sheets stay apart. Functions are interpolated from that one and its neighbors of the same sheet: moving least
     squares of first order, whose weights rise without bound at the points of the subset, so that these keep their
     values and functions linear along the surface stay linear: an error of second order in the spacing.
 
@@ -178,7 +178,7 @@ def _rows(subset: ArrayLike, count: int) -> Ints:
 
 
 def _weights(points: Floats, chosen: Floats, normals: Floats, component: Ints, index: Ints) -> tuple[Ints, Floats]:
-    """Return the rows of the subset that some points belong to, (b,), and the weights of their neighbours, (b, 9)."""
+    """Return the rows of the subset that some points belong to, (b,), and the weights of their neighbors, (b, 9)."""
     step = chosen[index] - points[:, None]
     height = np.einsum("ijk,ijk->ij", normals[index], step)
     squared = np.einsum("ijk,ijk->ij", step, step)
@@ -207,13 +207,13 @@ def balanced_weights(weight: Floats, offset: Floats, least: float, beyond: float
     Parameters
     ----------
     weight : ndarray, (n, k)
-        Of the neighbours of each place; they add up to one, and so does what is returned.
+        Of the neighbors of each place; they add up to one, and so does what is returned.
     offset : ndarray, (d, n, k)
-        Where the neighbours are, seen from the place.
+        Where the neighbors are, seen from the place.
     least : float
-        Share of the neighbours' scatter that counts as one in each direction: those in which less is not balanced.
+        Share of the neighbors' scatter that counts as one in each direction: those in which less is not balanced.
     beyond : float
-        Scatters beyond the middle of the neighbours up to which values go on in their slope.
+        Scatters beyond the middle of the neighbors up to which values go on in their slope.
 
     Returns
     -------

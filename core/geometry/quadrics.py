@@ -9,18 +9,18 @@ from ..errors import NotASurfaceError
 from ..types import Array, Floats, Ints
 
 _BLOCK = 1 << 13  # points fitted at one time
-_CURVE = 5e-3  # roundness of neighbours on a curve
+_CURVE = 5e-3  # roundness of neighbors on a curve
 MANY = 0.1  # share of the points: fewer are a few places, and not the whole scan
 CURVED = 0.3  # share by which curvature may change a length, an area or a weight at most, where the fit is poor
 _FADING = 0.84  # scatter of fits with weights that fade, over that with the same number of equal ones
 _LOOSE = 15.0  # bend over noise, in units of the neighborhood: up to 7 at edges, 18 and more through two even rows
 _FORM = np.array([1.0, 0.5, 1.0])  # weights of the squares of u^2, u v and v^2: the same whatever way u and v point
-_RIDGE = 1e-10  # keeps the normal equations solvable where the neighbours lie on a conic
+_RIDGE = 1e-10  # keeps the normal equations solvable where the neighbors lie on a conic
 
 
 @dataclass(frozen=True)
 class Quadrics:
-    """A quadric through the neighbours of every point.
+    """A quadric through the neighbors of every point.
 
     Attributes
     ----------
@@ -34,12 +34,12 @@ class Quadrics:
         Second fundamental form: ``t . shape_operator t`` is the curvature along the unit tangent t, positive where the
         surface curves away from the normal.
     misfit : ndarray, (m,)
-        Root mean square distance of the neighbours from the quadric [L].
+        Root mean square distance of the neighbors from the quadric [L].
     scatter : ndarray, (m,)
         Standard deviation of the mean curvature over that of noise across the surface [1 / L^2], by the places of the
-        neighbours, within a tenth where these lie around the point.
+        neighbors, within a tenth where these lie around the point.
     roundness : ndarray, (m,)
-        Variance of the neighbours across over that along: next to zero on a curve, which has no normal; one where the
+        Variance of the neighbors across over that along: next to zero on a curve, which has no normal; one where the
         normal was given.
     """
 
@@ -72,7 +72,7 @@ def fit_quadrics(
 ) -> Quadrics:
     """Fit ``z = c0 + c1 u + c2 v + c3 u^2 + c4 u v + c5 v^2`` around points.
 
-    Neighbours that lie in two rows, as at the edge of scan lines, leave the slope across free: of all quadrics that fit
+    Neighbors that lie in two rows, as at the edge of scan lines, leave the slope across free: of all quadrics that fit
     them, the least bent one counts there.
 
     Parameters
@@ -80,13 +80,13 @@ def fit_quadrics(
     points : ndarray, (m, 3)
         Coordinates.
     index : ndarray, (k, neighbors) int
-        Neighbours of k points, ordered by distance, the point itself first.
+        Neighbors of k points, ordered by distance, the point itself first.
     weight : ndarray, (k, neighbors)
-        Weights of the neighbours.
+        Weights of the neighbors.
     rows : ndarray, (k,) int, optional
         The points; all m of them if not given.
     normals : ndarray, (k, 3), optional
-        Where the axis z points; the direction of least variance of the same neighbours if not given.
+        Where the axis z points; the direction of least variance of the same neighbors if not given.
 
     Returns
     -------
@@ -163,12 +163,12 @@ def _sums(left: Floats, right: Floats) -> Floats:
 
 
 def roundness(variances: Array) -> Floats:
-    """Return the second over the largest variance of neighbourhoods, (k,), by variances in ascending order, (k, 3)."""
+    """Return the second over the largest variance of neighborhoods, (k,), by variances in ascending order, (k, 3)."""
     return variances[:, 1] / np.maximum(variances[:, 2], 1e-300)
 
 
 def count_curves(roundness: Floats) -> int:
-    """Return around how many points the neighbours lie along a curve, by how round their neighbourhoods are, (m,)."""
+    """Return around how many points the neighbors lie along a curve, by how round their neighborhoods are, (m,)."""
     return int(np.count_nonzero(roundness < _CURVE))
 
 
@@ -178,7 +178,7 @@ def check_surface(curves: int, count: int) -> None:
     Raises
     ------
     NotASurfaceError
-        The points of many neighbourhoods lie along a curve.
+        The points of many neighborhoods lie along a curve.
     """
     if curves > MANY * count:
         raise NotASurfaceError(

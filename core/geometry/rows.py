@@ -1,4 +1,4 @@
-"""Neighbours across rows: where points crowd along lines, such as the rings of a turning lidar."""
+"""Neighbors across rows: where points crowd along lines, such as the rings of a turning lidar."""
 
 from dataclasses import replace
 
@@ -10,15 +10,15 @@ from .components import label_connected
 from .nearest import NEXT, ROW, SMOOTH, Nearest, fading_weights
 from .quadrics import fit_quadrics
 
-_WIDER = 16  # times the 40 neighbours are looked at: the next row may be a hundred times as far as the next point
+_WIDER = 16  # times the 40 neighbors are looked at: the next row may be a hundred times as far as the next point
 _BLOCK = 1 << 11  # points looked at at one time
 
 
 def look_across_rows(nearest: Nearest) -> Nearest:
-    """Find the neighbours of points anew whose nearest ones lie along a row, as long as there are other rows.
+    """Find the neighbors of points anew whose nearest ones lie along a row, as long as there are other rows.
 
     They are then the nearest ones in each of eight directions, in turn. Of a curve, which has no rows beside it, the
-    points keep the neighbours that they have.
+    points keep the neighbors that they have.
 
     Parameters
     ----------

@@ -20,11 +20,11 @@ class Sample:
     component : ndarray, (m,) int
         Of each point, the largest 0.
     nearest : Nearest
-        Neighbours of each point; components stand far apart there, and noisy points are where they were moved to.
+        Neighbors of each point; components stand far apart there, and noisy points are where they were moved to.
     noise : ndarray, (m,)
         Noise that was smoothed at each point, as a share of the spacing; zero where none was.
     scatter : ndarray, (2, m)
-        What quadrics missed the neighbours of each point by before that, see `likely_causes`; zero until it is known.
+        What quadrics missed the neighbors of each point by before that, see `likely_causes`; zero until it is known.
     step : float
         Distance from level to level where depth is rounded so coarsely that this was smoothed, as a share of the
         spacing; zero elsewhere.

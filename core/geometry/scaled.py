@@ -15,7 +15,7 @@ class ScaledPoints:
     Attributes
     ----------
     points : ndarray, (m, 3)
-        Distinct points in scaled coordinates, in the order of a k-d tree, which keeps neighbours near in memory.
+        Distinct points in scaled coordinates, in the order of a k-d tree, which keeps neighbors near in memory.
     scale : float
         The root mean square radius [L]: caller's length = scale * scaled length.
     inverse : ndarray, (n,) int

@@ -21,11 +21,11 @@ from .patches import Patch
 from .quadrics import Quadrics, chords, eighths, fit_quadrics, in_plane
 
 _LEANING = 0.1  # what normals may be off by, as a share of the distance
-_SEEDS = 9  # nearest neighbours, every two of which make such a plane
+_SEEDS = 9  # nearest neighbors, every two of which make such a plane
 _BLOCK = 1 << 11
 _AROUND = 1.6  # path along a sheet over the chord, at most: 1.41 across a right angle, in steps that zigzag by an
 # eighth; points that many spacings apart touch
-_NEARBY, _SOURCES = 1 << 9, 1 << 6  # points that share a neighbourhood; of them, from which paths are followed at once
+_NEARBY, _SOURCES = 1 << 9, 1 << 6  # points that share a neighborhood; of them, from which paths are followed at once
 
 
 def same_sheet(
@@ -86,13 +86,13 @@ class Sheets(NamedTuple):
     Attributes
     ----------
     quadrics : Quadrics
-        Of the m points, through neighbours on their own sheets.
+        Of the m points, through neighbors on their own sheets.
     nearest : Nearest
-        With the neighbours on other sheets at weight zero.
+        With the neighbors on other sheets at weight zero.
     mixed : Quadrics
-        Through all neighbours.
+        Through all neighbors.
     planes : ndarray, (m, 3)
-        Unit normals by which neighbours on other sheets were found.
+        Unit normals by which neighbors on other sheets were found.
     """
 
     quadrics: Quadrics
@@ -101,16 +101,16 @@ class Sheets(NamedTuple):
     planes: Floats
 
     def take(self, rows: Ints, nearest: Nearest) -> Sheets:
-        """Return those of some rows, (k,) int, by the neighbours of these points."""
+        """Return those of some rows, (k,) int, by the neighbors of these points."""
         kept = replace(nearest, weight=self.nearest.weight[rows])
         return Sheets(self.quadrics.take(rows), kept, self.mixed.take(rows), self.planes[rows])
 
 
 def fit_sheets(nearest: Nearest, before: Sheets | None = None, changed: Bools | None = None) -> Sheets:
-    """Fit a quadric around every point to the neighbours of its own sheet.
+    """Fit a quadric around every point to the neighbors of its own sheet.
 
-    Where the quadric of all neighbours misses them, a plane is looked for among those through the point and two of its
-    nearest neighbours that has most neighbours near it, and moved to fit these best. With these normals neighbours on
+    Where the quadric of all neighbors misses them, a plane is looked for among those through the point and two of its
+    nearest neighbors that has most neighbors near it, and moved to fit these best. With these normals neighbors on
     other sheets are separated from those on the point's own, and left out of its quadric.
 
     Parameters
@@ -120,7 +120,7 @@ def fit_sheets(nearest: Nearest, before: Sheets | None = None, changed: Bools | 
     before : Sheets, optional
         Of the same points before some of them moved, which is kept where nothing has changed.
     changed : ndarray, (m,) bool, optional
-        Points that have moved, or have neighbours that did or that are others than before.
+        Points that have moved, or have neighbors that did or that are others than before.
     """
     points, index, whole = nearest.points, nearest.index, nearest.weight
     if before is None or changed is None:
@@ -223,9 +223,9 @@ def number_sheets(sheet: Ints, component: Ints) -> Ints:
 
 
 def sheet_neighbors(nearest: Nearest, normals: Floats, oriented: bool) -> Bools:
-    """Tell which neighbours of every point are the nearest ones on its sheet in one of eight directions, (m, 41) bool.
+    """Tell which neighbors of every point are the nearest ones on its sheet in one of eight directions, (m, 41) bool.
 
-    Unlike a number of nearest neighbours, they lie all around a point where points crowd along lines, too.
+    Unlike a number of nearest neighbors, they lie all around a point where points crowd along lines, too.
     """
     result = np.zeros(nearest.index.shape, dtype=bool)
 
@@ -233,7 +233,7 @@ def sheet_neighbors(nearest: Nearest, normals: Floats, oriented: bool) -> Bools:
         block = np.arange(part.start, part.stop)
         index = nearest.index[block]
         x, y = in_plane(chords(nearest.points, block, index), normals[block])
-        # Counted from the nearest neighbour, so that they turn with the points: it lies in the middle of an eighth.
+        # Counted from the nearest neighbor, so that they turn with the points: it lies in the middle of an eighth.
         nearest_one = x[:, 1] + 1j * y[:, 1]
         turn = np.where(nearest_one == 0.0, 1.0, nearest_one) * np.exp(-1j * np.pi / NEXT)
         cosine, sine = turn.real[:, None], turn.imag[:, None]
@@ -318,7 +318,7 @@ def _plainly_on_one_sheet(pairs: Pairs, oriented: Floats, spacing: Floats) -> Bo
 def step_lengths(
     nearest: Nearest, oriented: Floats, settle: Callable[[Callable[[], Ints]], Ints] = lambda find: find()
 ) -> sparse.csr_array:
-    """Return the lengths of the steps along sheets between next neighbours.
+    """Return the lengths of the steps along sheets between next neighbors.
 
     Sharp folds, whose normals join them to nothing, are joined to what is nearest to them.
 
@@ -334,7 +334,7 @@ def step_lengths(
     Returns
     -------
     csr_array, (m, m)
-        Symmetric; no more parts than the neighbourhoods themselves hang together in.
+        Symmetric; no more parts than the neighborhoods themselves hang together in.
     """
     next_to = sheet_neighbors(nearest, oriented, True)
     count = len(next_to)
@@ -350,7 +350,7 @@ def step_lengths(
 
 
 def find_bridges(nearest: Nearest, label: Ints) -> Ints:
-    """Return the shortest edges between neighbours that join points of different labels, (m,): (k, 2) int."""
+    """Return the shortest edges between neighbors that join points of different labels, (m,): (k, 2) int."""
     row, column = np.nonzero(label[nearest.index] != label[:, None])
     other, gap = nearest.index[row, column], nearest.distance[row, column]
     return np.column_stack([row, other])[choose_bridges(label[row], label[other], gap)]
@@ -390,7 +390,7 @@ def ways_along(steps: sparse.csr_array, tree: cKDTree, first: Ints, second: Ints
     first, second = np.where(swap, second, first), np.where(swap, first, second)
     furthest = np.zeros(tree.n)
     np.maximum.at(furthest, first, longest)
-    # Starts near each other share a neighbourhood; those of ways as long among them are followed at once.
+    # Starts near each other share a neighborhood; those of ways as long among them are followed at once.
     start = tree.indices[furthest[tree.indices] > 0.0]
     start = start[np.lexsort((furthest[start], np.arange(len(start)) // _NEARBY))]
     number = np.empty(tree.n, dtype=np.int64)

@@ -12,24 +12,24 @@ from .rows import look_across_rows
 
 PARTS = 30  # points of a part that others are joined to, and that is no clump of stray points
 _ON = 0.4  # spacings from the surface within which a point lies on it
-_AROUND = slice(1, 25)  # neighbours whose spacing a point's own is compared with, by their lower quartile
-_LONELY = 1.7  # times that a point's third neighbour is away: no witness until it is known to be on the surface
-_ALONE = 2.0  # times the spacing around that a point's third neighbour is away: off the surface by one, it is stray
+_AROUND = slice(1, 25)  # neighbors whose spacing a point's own is compared with, by their lower quartile
+_LONELY = 1.7  # times that a point's third neighbor is away: no witness until it is known to be on the surface
+_ALONE = 2.0  # times the spacing around that a point's third neighbor is away: off the surface by one, it is stray
 _POWER = 4.0  # of that distance: a little farther away tells more than a little higher
 _HIGHEST = 4.0  # height that counts: where points scatter more, as in trees, it tells no more
 _SPARSE = 1.3  # times its spacing: witnesses must show a surface
 _FILLING = 0.6  # scatter around a witness, in spacings, that no surface has
 _ROUGHER = 2.0  # nor has it so much more than the upper quartile of the cloud
 _ROUNDS = 6  # after which what is on the surface hardly changes
-_NEAR, _GAP = 3, 2.5  # points within so many distances of their third neighbours, at both ends, are joined
-_REACH, _WIDE = 7, 2.0  # and few points to many, within two distances of the seventh neighbour of those
+_NEAR, _GAP = 3, 2.5  # points within so many distances of their third neighbors, at both ends, are joined
+_REACH, _WIDE = 7, 2.0  # and few points to many, within two distances of the seventh neighbor of those
 
 
 def stray_scores(nearest: Nearest, report: Report = lambda: None) -> Floats:
-    """Measure how far points are off the surface that their neighbours describe.
+    """Measure how far points are off the surface that their neighbors describe.
 
-    As in `find_outliers` twelve neighbours are the witnesses of a point, and three must agree. Here points far from
-    their neighbours, by the spacing of these, take part in no witness' quadric until they are known to be on the
+    As in `find_outliers` twelve neighbors are the witnesses of a point, and three must agree. Here points far from
+    their neighbors, by the spacing of these, take part in no witness' quadric until they are known to be on the
     surface, so that many stray points do not vouch for each other. What scatters about the surface as densely as the
     points around is no stray, and what lies alone needs less height to be one.
 
@@ -45,7 +45,7 @@ def stray_scores(nearest: Nearest, report: Report = lambda: None) -> Floats:
     ndarray, (m,)
         Above 1 for stray points: the height, that is the third least over the quadrics of the witnesses, over what
         counts as on the surface, 4 at most, or its cube where above 1, times the fourth power of the distance of the
-        third neighbour on the surface, over two spacings of the points there. Infinite where no three witnesses show a
+        third neighbor on the surface, over two spacings of the points there. Infinite where no three witnesses show a
         surface.
     """
     spacing, surface = nearest.spacing, nearest.quadrics
@@ -60,7 +60,7 @@ def stray_scores(nearest: Nearest, report: Report = lambda: None) -> Floats:
         changed = (off != before)[nearest.index].any(axis=1)
         gone = off[nearest.index]
         clean, fewer = nearest.keep(~gone), gone.any(axis=1)
-        # Where all neighbours count, quadrics and heights are those of the start again.
+        # Where all neighbors count, quadrics and heights are those of the start again.
         rows, whole = np.flatnonzero(changed & fewer), np.flatnonzero(changed & ~fewer)
         surface = surface.put(whole, nearest.quadrics.take(whole))
         surface.assign(rows, fit_quadrics(clean.points, clean.index[rows], clean.weight[rows], rows))
@@ -87,16 +87,16 @@ def stray_scores(nearest: Nearest, report: Report = lambda: None) -> Floats:
 
 
 def _loneliness(nearest: Nearest, off: Bools) -> Floats:
-    """Return how far the third neighbour is, over the spacing there, (m,), as if points off the surface were not there.
+    """Return how far the third neighbor is, over the spacing there, (m,), as if points off the surface were not there.
 
-    The spacing is the median of those of the three neighbours. The last of the forty stands for those beyond.
+    The spacing is the median of those of the three neighbors. The last of the forty stands for those beyond.
     """
     gone = off[nearest.index[:, 1:]]
     rows, last, fewer = np.arange(len(off)), gone.shape[1], np.flatnonzero(gone.any(axis=1))
     known = np.cumsum(~gone[fewer], axis=1, dtype=np.int8)
 
     def place(count: int) -> Ints:
-        """Return where the neighbour of that number stands, or the last one."""
+        """Return where the neighbor of that number stands, or the last one."""
         found = np.full(len(off), min(count, last))
         found[fewer] = np.minimum(1 + np.count_nonzero(known < count, axis=1), last)
         return found
@@ -133,7 +133,7 @@ def _heights(
 
 
 def without(nearest: Nearest, off: Bools) -> Nearest:
-    """Return the neighbours of the points that are not off the surface, (m,) bool."""
+    """Return the neighbors of the points that are not off the surface, (m,) bool."""
     around: Bools = np.any(off[nearest.index], axis=1)
     return look_across_rows(nearest.renewed(nearest.points[~off], around, ~off))
 
@@ -141,7 +141,7 @@ def without(nearest: Nearest, off: Bools) -> Nearest:
 def label_parts(nearest: Nearest) -> Ints:
     """Number the parts of a cloud without points off its surface, which gaps separate.
 
-    Points are joined to neighbours nearer than 2.5 times the distances of the third neighbours of both, so that clumps
+    Points are joined to neighbors nearer than 2.5 times the distances of the third neighbors of both, so that clumps
     of few points do not reach each other; then parts of few points to those of many, within the reach of these.
 
     Parameters

@@ -18,7 +18,7 @@ _DISCS = 0.7  # points a squared radius that discs in random order leave on an a
 _VOXELS = 1.5  # voxels that a surface of area one meets for each squared edge, on average over its directions
 _FEW = 0.9  # of the points wanted, which are enough
 _CLOSER = 0.8  # times the radius, at which more points are filled in
-_SAMPLE, _AROUND = 20_000, 9  # of candidates, and neighbours of each, that give the area
+_SAMPLE, _AROUND = 20_000, 9  # of candidates, and neighbors of each, that give the area
 _TRIALS = 8  # of voxels, or of radii
 
 

@@ -72,7 +72,7 @@ def thin(
 def apart(points: Floats, reach: Floats | float, order: Array, rank: Ints | None, report: Report) -> Bools:
     """Return which points have none before them, in their order, within reach that stays, (m,) bool.
 
-    Among as many neighbours as are looked at; the reach of two points is the mean of theirs, (m,) or one for all [L],
+    Among as many neighbors as are looked at; the reach of two points is the mean of theirs, (m,) or one for all [L],
     and those of different ranks above zero, (m,) int, do not displace each other.
     """
     reach = np.broadcast_to(reach, len(points))
@@ -83,7 +83,7 @@ def apart(points: Floats, reach: Floats | float, order: Array, rank: Ints | None
 
 
 def _close_pairs(start: int, distance: Floats, index: Ints, reach: Floats, rank: Ints) -> tuple[Ints, Ints]:
-    """Return the pairs of some points and their neighbours of which only one may stay, as two arrays."""
+    """Return the pairs of some points and their neighbors of which only one may stay, as two arrays."""
     row = np.repeat(np.arange(start, start + len(index)), index.shape[1])
     other = index.ravel()
     apart = (rank[row] > 0) & (rank[other] > 0) & (rank[row] != rank[other])

@@ -83,7 +83,7 @@ def find_voids(nearest: Nearest, normals: Floats, cells: Cells, gaps: Floats, sc
     gaps : ndarray, (m,)
         The usual radius of empty discs, from `mean_gaps`.
     scatter : ndarray, (m,)
-        What quadrics through the own sheet miss the neighbours by, in spacings.
+        What quadrics through the own sheet miss the neighbors by, in spacings.
 
     Returns
     -------

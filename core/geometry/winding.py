@@ -23,9 +23,9 @@ _SAMPLE = 2000  # points whose spacing gives the median one
 
 
 def orient_by_winding(nearest: Nearest, normals: Floats, place: Floats, part: Ints) -> Floats:
-    """Flip normals so that neighbours agree, and every patch of the surface with all others, outwards.
+    """Flip normals so that neighbors agree, and every patch of the surface with all others, outwards.
 
-    Where sheets come close, neighbours tell little: a leg of a figure may get its sign from the other leg that it
+    Where sheets come close, neighbors tell little: a leg of a figure may get its sign from the other leg that it
     touches. The winding number, of all points, decides.
 
     Parameters
@@ -63,7 +63,7 @@ def orient_patches(nearest: Nearest, normals: Floats, place: Floats) -> tuple[Fl
 def divide_patches(points: Floats, normals: Floats, tree: sparse.csr_array) -> Ints:
     """Number patches of points, (m,), joined by links of the tree over which the sign is beyond doubt.
 
-    Small patches are joined to their surest neighbour, round by round, until none is left, and larger ones as well
+    Small patches are joined to their surest neighbor, round by round, until none is left, and larger ones as well
     while there are too many: a wall in a narrow slot of which half the points belong to no patch but that of the other
     wall would get its sign from there.
     """

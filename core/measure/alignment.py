@@ -280,7 +280,7 @@ class _Surface:
 
     @property
     def unit(self) -> float:
-        """Distance between neighbours [L]."""
+        """Distance between neighbors [L]."""
         return float(np.median(self.spacing))
 
     def coarse(self) -> Ints:

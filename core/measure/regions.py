@@ -122,10 +122,10 @@ class SurfaceMeasures:
         self.area_doubts = _area_doubts(laplacian, self.spacing)
         self.boundary_lengths = _boundary_lengths(self.areas, laplacian.boundary_distance, self.spacing)
         self.boundary_doubts = self.boundary_lengths * self.spacing * _strips(laplacian, self.spacing)
-        # The heat of a point flows to its neighbours at twice this rate at most.
+        # The heat of a point flows to its neighbors at twice this rate at most.
         self.rates = np.where(known, laplacian.stiffness.diagonal() / laplacian.areas, 0.0)
         self._places = laplacian.surface_points - laplacian.surface_points[known].mean(axis=0)
-        self._reach = float(np.sqrt(laplacian.stiffness.nnz / len(known) / np.pi))  # spacings to the furthest neighbour
+        self._reach = float(np.sqrt(laplacian.stiffness.nnz / len(known) / np.pi))  # spacings to the furthest neighbor
 
     def around(self, members: Bools) -> Ints:
         """Return all points within some spacings of the line between members and others, (r,) int."""

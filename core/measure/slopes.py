@@ -10,9 +10,9 @@ from ..cores import cores
 from ..geometry import Discs, frames
 from ..types import Floats
 
-_COUNT = 12  # neighbours: two rings of an even sample
+_COUNT = 12  # neighbors: two rings of an even sample
 _ROUND = 0.01  # of `lifted_inverse`
-_RIDGE = 0.01  # of the second derivatives, which neighbours may hardly determine, as a share of their trace
+_RIDGE = 0.01  # of the second derivatives, which neighbors may hardly determine, as a share of their trace
 _DETERMINED = 0.1  # share of the determinant of slopes alone that is left beside second derivatives, or these are zero
 _UNFIT = 14.0  # inverse of the share of the squared rises that a fit of so many coefficients may miss
 _BLOCK = 1 << 13  # points at one time
@@ -39,11 +39,11 @@ class Slopes:
 
     Notes
     -----
-    A quadratic function of the tangent plane through the value at the point is fitted to the nearest neighbours, with
+    A quadratic function of the tangent plane through the value at the point is fitted to the nearest neighbors, with
     weights that fall with their distance and with their height above that plane: those a radius above it do not count,
     such as the other side of a thin wall. As far as it fits badly, its slope is limited so that values within the disc
-    stay in the range of the neighbours, as by a limiter of finite volumes: no overshoots at noise, peaks and jumps.
-    Halfway to a neighbour, slopes of both then give values that differ by terms of third order.
+    stay in the range of the neighbors, as by a limiter of finite volumes: no overshoots at noise, peaks and jumps.
+    Halfway to a neighbor, slopes of both then give values that differ by terms of third order.
 
     Examples
     --------
@@ -96,9 +96,9 @@ class Slopes:
 
 
 def _fit(flat: list[Floats], height: Floats, rise: Floats) -> Floats:
-    """Fit quadratic functions to rises from points to their neighbours, (n, k); return their slopes, limited, (n, 2).
+    """Fit quadratic functions to rises from points to their neighbors, (n, k); return their slopes, limited, (n, 2).
 
-    Neighbours are given by their two steps in the tangent plane and their height above it, (n, k) each in radii.
+    Neighbors are given by their two steps in the tangent plane and their height above it, (n, k) each in radii.
     """
     across, along = flat
     squared = across**2 + along**2
@@ -127,7 +127,7 @@ def _determinant(sums: Floats) -> Floats:
 
 
 def _limit(slope: Floats, rise: Floats) -> Floats:
-    """Return which share of slopes stays within the range of the rises to neighbours, (n,)."""
+    """Return which share of slopes stays within the range of the rises to neighbors, (n,)."""
     steep = np.hypot(*slope.T)
     room = np.maximum(np.minimum(rise.max(axis=1), -rise.min(axis=1)), 0.0)
     return np.divide(room, steep, out=np.ones_like(steep), where=steep > room)

@@ -1,4 +1,4 @@
-"""Surface variation: how far the neighbourhood of a point is from a plane, by the covariance of its points."""
+"""Surface variation: how far the neighborhood of a point is from a plane, by the covariance of its points."""
 
 import numpy as np
 from scipy import sparse
@@ -13,19 +13,19 @@ def surface_variation(laplacian: LaplaceBeltrami) -> Floats:
     Parameters
     ----------
     laplacian : LaplaceBeltrami
-        The neighbourhood of a point is what it couples the point with: the support of the kernel, on one sheet. Points
+        The neighborhood of a point is what it couples the point with: the support of the kernel, on one sheet. Points
         count by their areas, so that the sampling does not matter.
 
     Returns
     -------
     ndarray, (n,)
-        Smallest eigenvalue of the covariance of the neighbourhood over the sum of all three: 0 in a plane, 1/3 where
-        the neighbours scatter alike in all directions. On a sphere it grows with the square of the kernel's width over
+        Smallest eigenvalue of the covariance of the neighborhood over the sum of all three: 0 in a plane, 1/3 where
+        the neighbors scatter alike in all directions. On a sphere it grows with the square of the kernel's width over
         the radius; it does not change with the scale. 0 at points left out.
 
     See Also
     --------
-    principal_curvatures : How the surface curves, independent of the size of the neighbourhood.
+    principal_curvatures : How the surface curves, independent of the size of the neighborhood.
     clean.roughness : Height of points above the smoothed surface, as a length.
 
     References

@@ -52,7 +52,7 @@ class Propagator:
     count : int
         All points, n.
     order : ndarray, (m,) int
-        Those that are not left out, neighbours near in memory.
+        Those that are not left out, neighbors near in memory.
     """
 
     def __init__(self, laplacian: LaplaceBeltrami, progress: Progress | None) -> None:

@@ -129,7 +129,7 @@ def _gain(matrix: KernelMatrix, lengths: Floats) -> Floats:
 class KernelMatrix:
     """The symmetric matrix A of eq. (6), a_ij = W(distance_ij, h_ij), kept as half its pairs.
 
-    Near a boundary the image of a point in it counts as a neighbour too.
+    Near a boundary the image of a point in it counts as a neighbor too.
     """
 
     def __init__(self, pairs: Pairs, distance: Floats, boundary: Boundary, report: Report = lambda: None) -> None:

@@ -1,4 +1,4 @@
-"""Averages over neighbours of what noise scatters: as many as take away more of the scatter than they add in bias."""
+"""Averages over neighbors of what noise scatters: as many as take away more of the scatter than they add in bias."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _CHANCE = 1.5  # times what noise alone would change: more is bias
 _NOISE_ROUNDS = 4  # over which noise is measured
 _LOG = 2.0 * np.exp(np.euler_gamma)  # mean of squares of a normal distribution over their geometric mean
 _HIGH = 7.1  # (1 - p)^6 of weights p of a Gaussian: 1 + 7.1 times the sum of their squares remains for a single point
-_STAYS = 1.4  # variance of noise over that of what a fit to 24 neighbours takes away
+_STAYS = 1.4  # variance of noise over that of what a fit to 24 neighbors takes away
 _GAUSSIAN = 0.8  # variance of a Gaussian that leaves as much noise as the weights of the pairs, over that of these
 _LEAST = 1e-3  # noise below this share of the spacing is none, such as that of rounded coordinates
 
@@ -39,7 +39,7 @@ class Settled:
 
 
 class Averages:
-    """Averages over the neighbours of an operator, and how much noise they leave.
+    """Averages over the neighbors of an operator, and how much noise they leave.
 
     A second derivative of white noise, of deviation sigma, on points that take the area a each, seen through a Gaussian
     of variance w along each axis, has the variance ``sigma^2 a / (8 pi w^3)``: that of the mean curvature, and that of
@@ -102,7 +102,7 @@ class Averages:
         return Settled(values, left)
 
     def mean_square(self, values: Floats, rounds: int) -> Floats:
-        """Return the mean over the neighbours of squares of values, (n, k), summed over k, (n,)."""
+        """Return the mean over the neighbors of squares of values, (n, k), summed over k, (n,)."""
         return self._around((values**2).sum(axis=1), rounds)
 
     def _around(self, values: Floats, rounds: int = 2) -> Floats:
@@ -110,7 +110,7 @@ class Averages:
 
 
 def off_neighbors(laplacian: LaplaceBeltrami, values: Floats, rounds: int) -> Floats:
-    """Return how far values are off the mean of their neighbours by the weights of the stiffness, (n, k).
+    """Return how far values are off the mean of their neighbors by the weights of the stiffness, (n, k).
 
     Twice of it is of fourth order for what varies with the place, and all of what changes from point to point.
     """
@@ -122,9 +122,9 @@ def off_neighbors(laplacian: LaplaceBeltrami, values: Floats, rounds: int) -> Fl
 
 
 def _matrices(laplacian: LaplaceBeltrami) -> tuple[sparse.csr_array, sparse.csr_array, Floats]:
-    """Return two means over the neighbours: by the operator's weights, and of all of them and the point alike.
+    """Return two means over the neighbors: by the operator's weights, and of all of them and the point alike.
 
-    The first takes values of neighbours whose normal points to the other side with the other sign, and those beyond an
+    The first takes values of neighbors whose normal points to the other side with the other sign, and those beyond an
     edge at right angles not at all.
 
     Returns

@@ -8,7 +8,7 @@ from scipy import sparse
 from ..geometry import frames
 from .laplacian import LaplaceBeltrami
 
-_ROUNDING = 1e-9  # smaller over larger extent of the neighbours, squared, below which they lie on a line
+_ROUNDING = 1e-9  # smaller over larger extent of the neighbors, squared, below which they lie on a line
 
 
 def gradient_matrix(laplacian: LaplaceBeltrami) -> sparse.csr_array:

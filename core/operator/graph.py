@@ -1,4 +1,4 @@
-"""Near neighbours on the same sheet of the surface, as a graph with lengths."""
+"""Near neighbors on the same sheet of the surface, as a graph with lengths."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ _SEEN = 3  # nearest points examined for each that is joined: those of close she
 
 @dataclass(frozen=True)
 class NearGraph:
-    """Distinct positions of a cloud, joined to their nearest neighbours along the surface.
+    """Distinct positions of a cloud, joined to their nearest neighbors along the surface.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ def near_graph(laplacian: LaplaceBeltrami, count: int) -> NearGraph:
     ----------
     laplacian : LaplaceBeltrami
     count : int
-        Nearest neighbours of each point; all at the distance of the last one are included.
+        Nearest neighbors of each point; all at the distance of the last one are included.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def near_graph(laplacian: LaplaceBeltrami, count: int) -> NearGraph:
 
 
 def _coupled(stiffness: sparse.csr_array, first: Ints, index: Ints) -> Bools:
-    """Return which of their neighbours, (m, k) int, the stiffness couples rows with."""
+    """Return which of their neighbors, (m, k) int, the stiffness couples rows with."""
     row = np.repeat(first, index.shape[1])
     number = np.arange(1.0, index.size + 1.0)  # survives a product with the pattern of the stiffness
     numbers = sparse.csr_array((number, (row, first[index].ravel())), shape=stiffness.shape)
@@ -114,7 +114,7 @@ def coupled_components(laplacian: LaplaceBeltrami) -> Ints:
     """Number the components of the cloud between which the operator couples no points, (n,) int.
 
     Those of fewer than 41 points are -1: points left out, and single ones within a component that are so far off
-    its surface that they have no neighbours.
+    its surface that they have no neighbors.
     """
     count, label = connected_components(laplacian.stiffness, directed=False)
     large = np.bincount(label, minlength=count) >= COUNT
@@ -122,9 +122,9 @@ def coupled_components(laplacian: LaplaceBeltrami) -> Ints:
 
 
 def mean_spacing(laplacian: LaplaceBeltrami) -> Floats:
-    """Return the distance between the points of an even sample as dense as the neighbours of each, (n,) [L].
+    """Return the distance between the points of an even sample as dense as the neighbors of each, (n,) [L].
 
-    Points left out have no neighbours, and get the median of the others.
+    Points left out have no neighbors, and get the median of the others.
     """
     stiffness = laplacian.stiffness
     neighbors = sparse.csr_array((np.ones(stiffness.nnz), stiffness.indices, stiffness.indptr), shape=stiffness.shape)

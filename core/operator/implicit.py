@@ -75,7 +75,7 @@ class ImplicitSurface:
     points, normals : ndarray, (m, 3)
         The points on the surface in these units, from their middle on, and unit normals.
     spacing : ndarray, (m,)
-        Distance between neighbouring points in these units; next to a change of density the larger one.
+        Distance between neighboring points in these units; next to a change of density the larger one.
     local_spacing : ndarray, (m,)
         The same, everywhere that of the nearest points.
     """

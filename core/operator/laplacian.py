@@ -35,7 +35,7 @@ from .spectrum import TOLERANCE, Spectrum, check_count, correct_eigenvalues, sol
 from .stiffness import Stiffness, assemble_stiffness
 from .trust import doubt_notices, measure_trust
 
-NARROW = 45  # neighbours inside the support of a narrow operator: the fewest that suffice for random points
+NARROW = 45  # neighbors inside the support of a narrow operator: the fewest that suffice for random points
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -78,7 +78,7 @@ class LaplaceBeltrami(Frozen):
         Component of each point, the largest first; -1 for points that were left out.
     trust : ndarray, (n,)
         How reliable results are, from 0 to 1: less than a half where no positive weights have the moments of the kernel
-        within a tenth, or where the neighbours deviate from a quadric by their spacing. 0 for points left out.
+        within a tenth, or where the neighbors deviate from a quadric by their spacing. 0 for points left out.
     doubt : ndarray, (n,) int
         Why it is less than a half, of `Doubt`; 0 where it is not.
     smoothing_lengths : ndarray, (n,)
@@ -426,7 +426,7 @@ def build_laplacian(
     ------
     PointCloudError
         The input has no sound answer; the text says why and what to do. Its subclasses: points, normals or a boundary
-        of a wrong shape, or not finite (`InvalidPointsError`), fewer points than the neighbourhoods need
+        of a wrong shape, or not finite (`InvalidPointsError`), fewer points than the neighborhoods need
         (`TooFewPointsError`), points along a curve (`NotASurfaceError`), components of too few points alone
         (`ComponentError`), more points than the free memory is enough for, before the start (`NotEnoughMemoryError`).
 
@@ -561,14 +561,14 @@ def laplacian_of(
 def narrow_laplacian(
     laplacian: LaplaceBeltrami, neighbors: int = NARROW, *, rows: Ints | None = None, progress: Progress | None = None
 ) -> LaplaceBeltrami:
-    """Build an operator with few neighbours on the same points, to be factorised, or on some of them.
+    """Build an operator with few neighbors on the same points, to be factorised, or on some of them.
 
     Parameters
     ----------
     laplacian : LaplaceBeltrami
         Its normals, boundary and `surface_points` are used.
     neighbors : int
-        Neighbours inside the kernel's support.
+        Neighbors inside the kernel's support.
     rows : ndarray, (k,) int, optional
         Points to build it on alone; its components do not join those of the given operator.
     progress : callable, optional
@@ -584,7 +584,7 @@ def narrow_laplacian(
         laplacian.options,
         bandwidth="local",
         neighbors=neighbors,
-        bandwidth_factor=1.0 / 3.0,  # the support of 3 h ends at the last neighbour
+        bandwidth_factor=1.0 / 3.0,  # the support of 3 h ends at the last neighbor
         projection="off",
     )
     points, normals, boundary = laplacian.surface_points, laplacian.normals, laplacian.boundary

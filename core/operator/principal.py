@@ -50,7 +50,7 @@ def mean_curvature(laplacian: LaplaceBeltrami) -> Floats:
         Mean of the two principal curvatures [1 / L]. Without noise it is that of the operator, which has the least
         bias. Noise scatters that more than the `LaplaceBeltrami.quadric_mean_curvature`, which then takes its place, as
         it does where the kernel extends beyond a boundary; and the more noise there is, the more often that is averaged
-        over the neighbours, as long as the scatter that goes is more than the bias that comes.
+        over the neighbors, as long as the scatter that goes is more than the bias that comes.
 
     See Also
     --------
@@ -175,7 +175,7 @@ class PrincipalCurvatures(Frozen):
 def principal_curvatures(laplacian: LaplaceBeltrami) -> PrincipalCurvatures:
     """Compute the principal curvatures: their mean by the operator, their difference and direction by local quadrics.
 
-    Where points are noisy both are averaged over the neighbours, as far as that takes away more scatter than it adds
+    Where points are noisy both are averaged over the neighbors, as far as that takes away more scatter than it adds
     bias: the shape operator as a tensor, so that noise in it does not add up to a difference that is not there. With a
     greater `LaplacianOptions.bandwidth_factor` each average is over more points.
 

@@ -148,7 +148,7 @@ def symmetric_form(
     Returns
     -------
     order : ndarray, (m,) int
-        The points that are not left out, neighbours near in memory, which makes the products faster; the same points
+        The points that are not left out, neighbors near in memory, which makes the products faster; the same points
         in whatever order they were given.
     root : ndarray, (m,)
         ``root * y`` is the function on these points that the vector y stands for.

@@ -64,7 +64,7 @@ def assemble_stiffness(
 ) -> Stiffness:
     """Assemble K = -D G D of eq. (10) for the caller's points, with weights of the moments that the kernel has.
 
-    Points at the same place take equal parts of its area and couple as neighbours at distance zero. The image of a
+    Points at the same place take equal parts of its area and couple as neighbors at distance zero. The image of a
     point in a boundary has the point's value, so that it adds to the weight of the pair.
 
     Parameters
@@ -163,7 +163,7 @@ def _kernel_weights(cloud: Cloud, distance: Floats, areas: Floats) -> tuple[Floa
 def _widths(pairs: Pairs, distance: Floats, areas: Floats, weights: Floats, images: _Images, alone: _Images) -> Floats:
     """Return the smoothing length of the kernel whose fourth moment, 8 mu2 h^2 of the area, the weights have, (m,).
 
-    It is a mean over the neighbours, as the operator would amplify random differences from point to point.
+    It is a mean over the neighbors, as the operator would amplify random differences from point to point.
     """
 
     def moments(patch: Patch) -> list[list[Floats]]:

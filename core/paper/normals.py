@@ -8,7 +8,7 @@ from ..geometry import Pairs, check_surface, count_curves, fading_weights, round
 from ..kernel import kernel
 from ..types import Floats
 
-_AROUND = 90  # neighbours of a plane that a point is projected onto
+_AROUND = 90  # neighbors of a plane that a point is projected onto
 _BLOCK = 1 << 12  # points
 
 
@@ -20,7 +20,7 @@ def covariance_normals(pairs: Pairs, weighted: bool = True) -> Floats:
     pairs : Pairs
         Of m distinct points.
     weighted : bool
-        Weigh by the kernel W_h (WPCA) or count every neighbour alike (PCA).
+        Weigh by the kernel W_h (WPCA) or count every neighbor alike (PCA).
 
     Returns
     -------
@@ -30,7 +30,7 @@ def covariance_normals(pairs: Pairs, weighted: bool = True) -> Floats:
     Raises
     ------
     NotASurfaceError
-        The points of many neighbourhoods lie along a curve.
+        The points of many neighborhoods lie along a curve.
     """
     points = pairs.points
     if weighted:
@@ -53,7 +53,7 @@ def covariance_normals(pairs: Pairs, weighted: bool = True) -> Floats:
 
 
 def tangent_planes(points: Floats) -> Floats:
-    """Project every point onto the plane through its neighbours, as section 6 does for noisy points.
+    """Project every point onto the plane through its neighbors, as section 6 does for noisy points.
 
     Parameters
     ----------

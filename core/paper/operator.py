@@ -39,14 +39,14 @@ def build_laplacian(
     areas : {"constrained", "regularized", "uniform"}
         Area elements by eq. (8), by eq. (7), or the mean of those of eq. (7) for every point.
     normals : {"wpca", "pca"} or array_like, (n, 3)
-        From the covariance of eq. (9), its neighbours weighted by the kernel or all alike; or normals to use as they
+        From the covariance of eq. (9), its neighbors weighted by the kernel or all alike; or normals to use as they
         are, of any length and sign.
     regularization : float
         rho of eqs. (7) and (8), in coordinates scaled to a root mean square radius of one.
     neighbors : int
-        h is the mean distance to this neighbour; the radius of the kernel is 3 h, for some nine times as many.
+        h is the mean distance to this neighbor; the radius of the kernel is 3 h, for some nine times as many.
     denoise : bool
-        Project every point onto the plane through its neighbours first, as section 6 does for noisy points.
+        Project every point onto the plane through its neighbors first, as section 6 does for noisy points.
     left_out : array_like, (k,) int or (n,) bool, optional
         Points to leave out.
     progress : callable, optional
@@ -170,7 +170,7 @@ def projected_distance(pairs: Pairs, normals: Floats) -> Floats:
 
 
 def unsymmetrized_operator(pairs: Pairs, normals: Floats, areas: Floats) -> sparse.csr_array:
-    """Assemble the operator of eq. (5): each row projects its neighbours on its own tangent plane.
+    """Assemble the operator of eq. (5): each row projects its neighbors on its own tangent plane.
 
     Parameters
     ----------

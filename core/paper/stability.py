@@ -20,11 +20,11 @@ class Stability(Frozen):
     area_ratio : float
         (A1) Largest area over the smallest.
     fill_distance : float
-        (A2) Largest distance of a point to its sixth neighbour [L]: no hole among the points is much wider.
+        (A2) Largest distance of a point to its sixth neighbor [L]: no hole among the points is much wider.
     most_neighbors : int
         (A3) Most points inside one support.
     least_bandwidth : float
-        (A4) Least ratio of the smoothing length to the distance of the sixth neighbour.
+        (A4) Least ratio of the smoothing length to the distance of the sixth neighbor.
     row_sum, column_sum : float
         Largest entry of L e and of areas . L, relative to the largest diagonal entry: both vanish, for e spans the
         kernel of L and the areas that of its transpose.

@@ -348,7 +348,7 @@ def _equilibrium(
     component = connected_components(stiffness, directed=False)[1]
     warm = np.bincount(component, heat)[component] > 0.0
     rows, cold = np.flatnonzero(warm), np.flatnonzero(~warm)
-    rows = rows[cKDTree(points[rows]).indices]  # neighbours near in memory make the products faster
+    rows = rows[cKDTree(points[rows]).indices]  # neighbors near in memory make the products faster
     matrix = (stiffness[rows][:, rows] + sparse.diags_array(heat[rows])).tocsr()
     load = (sparse.diags_array(heat[rows]) @ near[rows]).toarray()
     result = np.empty(near.shape)

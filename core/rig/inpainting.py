@@ -195,7 +195,7 @@ def _fill(surface: _Surface, free: Bools, found: Floats, biharmonic: bool, repor
     if not free.any():
         return
     held = free
-    for _ in range(2 if biharmonic else 1):  # neighbours, and their neighbours, are all that the equations hold
+    for _ in range(2 if biharmonic else 1):  # neighbors, and their neighbors, are all that the equations hold
         held = held | (surface.stiffness.astype(bool) @ held)
     near = np.flatnonzero(held)
     stiffness, points = surface.stiffness[near][:, near], surface.points[near]

@@ -29,7 +29,7 @@ def nodal_domains(
 ) -> Ints:
     """Divide the points into connected sets on which a function keeps its sign.
 
-    Points are connected to their nearest neighbours on the same sheet, so that two domains of one sign do not join
+    Points are connected to their nearest neighbors on the same sheet, so that two domains of one sign do not join
     through a narrow one of the other sign between them. Where the function is near zero its sign is not trusted: such
     points, and specks of a few points, go to the nearest domain of their sign, or else to the nearest one. Where nodal
     lines cross, the least change connects two of the four domains; so low bridges do not join domains.

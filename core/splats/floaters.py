@@ -13,7 +13,7 @@ from .splats import Splats
 _SEEN = 0.05  # opacity at the center below which a splat is invisible
 _HUGE = 10.0  # times the median length: the center of such a splat is not on the surface
 _APART = 3.0  # standard deviations, and times the median, at which a splat touches no other one
-_AGREEING = 3  # neighbours that it must touch, as on each of the three faces at a corner
+_AGREEING = 3  # neighbors that it must touch, as on each of the three faces at a corner
 _NEIGHBORS = 12  # nearest centers, of which these are chosen
 _BLOCK = 1 << 13  # splats worked on at one time
 

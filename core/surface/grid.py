@@ -226,7 +226,7 @@ def _band(surface: ImplicitSurface, levels: Levels, report: Callable[[], None]) 
         own = np.flatnonzero(levels.own == level)
         points = surface.points[own] / width
         reach = _reach(surface, own, width)
-        order = np.argsort(levels.keys(_whole(np.floor(points / 8.0) * 8.0)), kind="stable")  # neighbours work together
+        order = np.argsort(levels.keys(_whole(np.floor(points / 8.0) * 8.0)), kind="stable")  # neighbors work together
         half = np.ceil(np.hypot(reach, BAND)).astype(int)
         tasks = []
         for size in np.unique(half):

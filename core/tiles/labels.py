@@ -24,7 +24,7 @@ def label_links(site: Site, scaled: ScaledPoints, index: Ints, joined: Bools) ->
     scaled : ScaledPoints
         The m distinct points.
     index : ndarray, (m, k) int
-        Neighbours of each.
+        Neighbors of each.
     joined : ndarray, (m, k) bool
         Those that links lead to; what is said of points outside the box is left to their tiles.
 

@@ -50,7 +50,7 @@ _FILLED = 50_000  # points by which that is judged which fill volumes
 
 
 class Fitted(NamedTuple):
-    """A surface, and what quadrics through 20 neighbours miss these by, (m,), until noise is smoothed."""
+    """A surface, and what quadrics through 20 neighbors miss these by, (m,), until noise is smoothed."""
 
     surface: Surface
     near: Floats | None = None
@@ -100,7 +100,7 @@ def agree_on_reach(shelf: Shelf, options: LaplacianOptions) -> Record:
 
 
 def link_strictly(site: Site, sample: Sample) -> tuple[None, Told]:
-    """Join neighbours over edges that are no gaps."""
+    """Join neighbors over edges that are no gaps."""
     strict, _ = find_gaps(sample.nearest, float(site.record["reach"]))
     return None, label_links(site, sample.scaled, sample.nearest.index[:, 1:], strict)
 
@@ -159,7 +159,7 @@ def agree_on_noise(shelf: Shelf, options: LaplacianOptions) -> Record:
     Raises
     ------
     NotASurfaceError
-        The points of many neighbourhoods lie along a curve.
+        The points of many neighborhoods lie along a curve.
     """
     count, curves, noisy, filling = np.sum(list(shelf.told("noise", "counts")), axis=0).tolist()
     check_surface(curves, count)
@@ -190,7 +190,7 @@ def agree_on_filling(shelf: Shelf, options: LaplacianOptions) -> Record:
 
 
 def link_sheets(site: Site, fitted: Fitted) -> tuple[Fitted | None, Told]:
-    """Smooth noise, and join neighbours on sheets."""
+    """Smooth noise, and join neighbors on sheets."""
     given = _with_decisions(site, fitted.surface)
     surface = remove_noise(given, site.options, fitted.near)
     told = _link_neighbors(site, surface, surface.quadrics.normals, False) if site.options.sheets else {}
@@ -230,7 +230,7 @@ def agree_on_sheets(shelf: Shelf, options: LaplacianOptions) -> Record:
 
 
 def link_pieces(site: Site, fitted: Fitted) -> tuple[None, Told]:
-    """Join neighbours on the same side of sheets."""
+    """Join neighbors on the same side of sheets."""
     surface = fitted.surface
     return None, _link_neighbors(site, surface, site.sides()[surface.sample.scaled.first], True)
 
@@ -268,7 +268,7 @@ def agree_on_bridges(shelf: Shelf, options: LaplacianOptions) -> Record:
 
 
 def find_length(site: Site, fitted: Fitted) -> tuple[None, Told]:
-    """Sum up how far the neighbour is by whose distance the kernel of all points is as wide."""
+    """Sum up how far the neighbor is by whose distance the kernel of all points is as wide."""
     sample = fitted.surface.sample
     distance = neighbor_distance(sample.nearest.tree, site.options.neighbors, sample.component)
     own = distance[site.inner(sample.scaled)]

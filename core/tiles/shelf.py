@@ -24,7 +24,7 @@ class Part:
     inner : ndarray, (k,) bool
         Which lie in the box; each point lies in that of one tile.
     close : ndarray, (k,) bool
-        Which lie in the box or in the nearer half of the halo: the far end tells less, as its neighbours are missing.
+        Which lie in the box or in the nearer half of the halo: the far end tells less, as its neighbors are missing.
     owner : ndarray, (k,) int
         The tile in whose box each point lies.
     place : ndarray, (k,) int

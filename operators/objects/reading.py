@@ -241,7 +241,7 @@ def find_object(uid):
 
 
 def spacing(data) -> float:
-    """Return the typical distance of neighbouring points of a mesh or a point cloud, in local lengths; 0 if unknown."""
+    """Return the typical distance of neighboring points of a mesh or a point cloud, in local lengths; 0 if unknown."""
     return core.geometry.typical_distance(own_positions(data))
 
 
