@@ -37,7 +37,7 @@ _ROOT = Path(__file__).parent
 
 
 def _read(file: str) -> dict[str, str]:
-    """Return the module of each public name or package that a file lists, as type checkers read it."""
+    """Return the module of each public name or package that a file imports, parsed as type checkers do."""
     listed = ast.parse((_ROOT / file).read_text(encoding="utf-8"))
     imports = [node for node in listed.body if isinstance(node, ast.ImportFrom)]
     return {alias.name: node.module or alias.name for node in imports for alias in node.names}
@@ -45,7 +45,7 @@ def _read(file: str) -> dict[str, str]:
 
 _HOMES = _read("__init__.pyi")
 _NAMESPACES = [name for name, home in _HOMES.items() if name == home]
-_lock = threading.RLock()  # scipy imports itself in circles, which two threads at once might enter from two sides
+_lock = threading.RLock()  # scipy has circular imports: two threads at once may see half-loaded modules
 
 __all__ = sorted(name for name, home in _HOMES.items() if name != home)
 
@@ -69,7 +69,7 @@ def __dir__() -> list[str]:
 
 
 def _missing(name: str) -> str:
-    """Tell which namespace gives a name that is not here, if any does."""
+    """Return the error message for an unknown name, with the namespace that has it, if any."""
     for space in _NAMESPACES:
         if name in _read(f"{space}/__init__.py"):
             return f"`mf.{name}` is `mf.{space}.{name}`"

@@ -1,20 +1,20 @@
-"""Anderson's acceleration of repeated maps."""
+"""Anderson acceleration of fixed-point iterations."""
 
 import numpy as np
 
 from ..types import Floats
 
-_MEMORY = 5  # earlier steps that one is extrapolated from
+_MEMORY = 5  # previous steps that the next one is extrapolated from
 
 
 class Anderson:
-    """Accelerates a repeated map: half of the steps or fewer, to the same end.
+    """Accelerates a fixed-point iteration: half of the steps or fewer, to the same fixed point.
 
     Parameters
     ----------
     smallest : float
-        Regularization of the extrapolation, as a share of the squared changes of the steps: smaller changes are
-        rounding, or where the map is not linear.
+        Regularization of the least squares, relative to the trace of their matrix: smaller differences of residuals are
+        rounding error, or due to the map's not being linear.
 
     References
     ----------
@@ -27,7 +27,7 @@ class Anderson:
         self._differences: list[tuple[Floats, Floats]] = []
 
     def extrapolate(self, before: Floats, after: Floats) -> Floats:
-        """Return the start of the next step, from start and end of the last one, of one shape."""
+        """Return the next iterate, from the last one and what the map made of it, arrays of one shape."""
         change = after - before
         if self._last is not None:
             difference = after - self._last[0], change - self._last[1]
@@ -40,7 +40,7 @@ class Anderson:
         return after - np.sum(steps, axis=0)
 
     def _shares(self, change: Floats) -> tuple[float, ...]:
-        """Return the shares that make the next change least; none at first, or if no step changed anything."""
+        """Return the coefficients of least residual; none at first, or if no step changed anything."""
         changes = [changed for _, changed in self._differences]
         products = np.array([[_dot(left, right) for left in changes] for right in changes])
         if not products.any():

@@ -62,12 +62,12 @@ def chebyshev_terms(product: Callable[[Floats], Floats], start: Floats) -> Itera
 
 
 def chebyshev_steps(least: float, largest: float) -> Iterator[tuple[float, float]]:
-    """Yield how to go on, without end, from round to round of solving equations by their residuals alone.
+    """Yield the coefficients of Chebyshev's semi-iteration for linear equations, step by step, without end.
 
     Parameters
     ----------
     least, largest : float
-        Bounds of the eigenvalues, 0 < least < largest. What belongs to lower ones is solved for more slowly.
+        Bounds of the eigenvalues, 0 < least < largest. Components of smaller eigenvalues converge more slowly.
 
     Yields
     ------

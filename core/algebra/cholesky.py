@@ -12,7 +12,7 @@ from ..types import Floats, Ints
 from .blocks import blocks
 from .dense import product
 
-_BANDS = 6  # in which the lower half of a matrix is added
+_BANDS = 6  # of columns by which a lower triangle is added: less work than the whole square
 _WIDEST = 512  # unknowns that are eliminated at once, so that no step takes long
 
 
@@ -112,7 +112,7 @@ def _coupled(lower: sparse.csc_array, bounds: list[tuple[int, int]]) -> tuple[li
 
 
 def _add(front: Floats, place: Ints, left: Floats) -> None:
-    """Add the lower half of the Schur complement of an earlier front, at its places in this one, which ascend."""
+    """Scatter the lower triangle of an earlier front's Schur complement to its places in this one, which ascend."""
     if place[-1] - place[0] == len(place) - 1:
         front[place[0] : place[-1] + 1, place[0] : place[-1] + 1] += left
         return

@@ -15,16 +15,16 @@ from .dense import product, subtract_product
 from .hierarchy import SMALL, Known, Level, build_levels, smoothed, solve_roughly
 
 _DENSE = 4000  # in ten seconds; where the coarsest version has more, another solver is faster
-_BEYOND = 0.1  # how far beyond the last eigenvalue wanted, as a share of it, the block of vectors reaches
-_GUARDS = 4  # vectors that it has more, at least
-_WIDE = 32  # multiplicity up to which it holds all copies of the last eigenvalue, however few are wanted
-_RANDOM = 4  # vectors that start from random numbers, and converge to those that the coarse versions miss
-_FILTERED = 3  # applications of the approximate inverse that leave little of their fast parts
-_GUARDED = 0.1  # residual to which these converge, so that none below those asked for is missed
-_COARSE = 1e-2  # residual on coarse versions: finer, it would not help the next one
-_CYCLES = 4  # cycles of the approximate inverse in a step, at most
-_FALL = 3.0  # over what a cycle leaves of a residual, about
-_STEPS, _COARSE_STEPS = 24, 8  # at most; two to six are usual on the points, two on coarse versions
+_BEYOND = 0.1  # relative margin above the last eigenvalue wanted, up to which the block holds eigenvectors
+_GUARDS = 4  # further vectors in the block, at least: the last ones of a block converge slowly
+_WIDE = 32  # multiplicity of the last eigenvalue up to which the block holds its whole eigenspace
+_RANDOM = 4  # random start vectors, which converge to the eigenvectors that the coarse levels miss
+_FILTERED = 3  # V-cycles applied to these first, which damp their high-frequency components
+_GUARDED = 0.1  # residual to which the vectors beyond those wanted converge, so that none below is missed
+_COARSE = 1e-2  # residual on coarse levels: a smaller one would not improve the start on the next level
+_CYCLES = 4  # V-cycles in a Davidson step, at most
+_FALL = 3.0  # factor by which a V-cycle reduces the residual, about
+_STEPS, _COARSE_STEPS = 24, 8  # at most; two to six are usual on the points, two on coarse levels
 _BLOCK = 1 << 11  # rows of vectors worked on at one time
 _PATIENCE = 12  # steps after which the block of vectors is widened
 
@@ -44,12 +44,12 @@ def coarse_to_fine(
     matrix : csr_array, (n, n)
         Symmetric positive semi-definite.
     slowest : ndarray, (n,)
-        A positive vector that the matrix hardly changes.
+        A positive vector near the null space: its product with the matrix is about zero.
     count : int
     tolerance : float
         Largest residual, over the last eigenvalue wanted.
     scale : float
-        What that eigenvalue counts as at least, and about is.
+        Estimate of that eigenvalue, by which residuals are divided where it is larger.
     report : callable
         Called with the fraction done; may raise `Cancelled`.
 
@@ -65,7 +65,7 @@ def coarse_to_fine(
             return None
         values, vectors = eigh(last.toarray(), mass.toarray())
         coarsest = _known(values, vectors, mass)
-        flat = np.searchsorted(values, 1e-9 * values[-1])  # as many as components
+        flat = np.searchsorted(values, 1e-9 * values[-1])  # dimension of the null space: one for each component
         beyond = np.searchsorted(values, (1.0 + _BEYOND) * values[min(count, len(values)) - 1])
         size = min(max(min(max(beyond, count), 2 * count + _WIDE), flat) + _GUARDS, len(values))
         for number in reversed(range(len(levels))):
@@ -130,13 +130,13 @@ def refine(
     values, vectors : ndarray, (m,) and (n, m)
         The best after these steps.
     right : bool
-        The residuals fell as far.
+        All residuals reached their goals.
     """
     level, count, worst = levels[0], vectors.shape[1], 0.0
     rough_mass = None if level.mass is None else level.mass.astype(np.float32)
-    drift = np.inf  # of the images: they are products in double precision where it is 0, and sums from step to step
+    drift = np.inf  # bound on the rounding error of `image`, updated step by step; 0 for an exact product
     for step in range(limit + 1):
-        if final and step % _PATIENCE == _PATIENCE - 1:  # the block may end among copies of one eigenvalue: widen it
+        if final and step % _PATIENCE == _PATIENCE - 1:  # the block may cut an eigenspace in two: widen it
             vectors = np.column_stack([vectors, _random(len(vectors), _RANDOM + count // 8, step)])
             drift, count = np.inf, vectors.shape[1]
         if drift > 0.1 * tolerance:
@@ -148,7 +148,7 @@ def refine(
         residual, norms = _residual(image, dual, values)
         measure = max(values[wanted - 1], scale)
         residuals = norms / measure
-        # Unless vectors close to the wanted ones are about as exact, these stall, or stand where lower ones belong.
+        # Vectors just beyond the wanted ones must converge, too, or these stall, or a lower eigenvalue is missed.
         beyond = np.clip((values - values[wanted - 1]) / (0.5 * _BEYOND * measure), 0.0, 1.0)
         goals = tolerance * (max(_GUARDED, tolerance) / tolerance) ** beyond
         goals[:wanted] = tolerance
@@ -159,7 +159,7 @@ def refine(
         if drift == 0.0 and (excess <= 1.0 or step == limit):
             break
         if excess <= 1.0 or step == limit - 1:
-            drift = np.inf  # look again
+            drift = np.inf  # check with an exact product
             continue
         # The rest is in single precision: corrections of a few digits suffice.
         found = _single(vectors)
@@ -169,16 +169,16 @@ def refine(
         load /= norms[active].astype(np.float32)
         relative = shifts / np.float32(values[size - 1])
         change = solve_roughly(levels, coarsest, load, relative, size)
-        cycles = max(np.ceil(np.log(excess) / np.log(_FALL)), 1.0)  # in as few steps as hold them, of as many each
+        cycles = max(np.ceil(np.log(excess) / np.log(_FALL)), 1.0)  # spread evenly over the fewest steps
         for _ in range(int(np.ceil(cycles / np.ceil(cycles / _CYCLES))) - 1):
             subtract_product(change, found, product(dual.T, change))
             change += solve_roughly(levels, coarsest, _rest(level, rough_mass, load, change, shifts), relative, size)
         subtract_product(change, found, product(dual.T, change))
         change /= _lengths(change)
         report()
-        # The best combinations of both, in an orthonormal basis of the changes.
+        # Rayleigh-Ritz on the vectors and an orthonormal basis of their corrections.
         lengths, basis = eigh(product(change.T, _weighed(rough_mass, change)).astype(np.float64))
-        kept = lengths > 1e-5 * lengths[-1]  # the others drown in rounding
+        kept = lengths > 1e-5 * lengths[-1]  # the others are rounding error
         basis = basis[:, kept] / np.sqrt(lengths[kept])
         coupling = product(residual.T, change) @ basis
         report()

@@ -9,7 +9,7 @@ from scipy.linalg import get_blas_funcs
 from ..types import Array, Floats
 from .blocks import blocks, on_all_cores
 
-_WORK = 1 << 27  # multiplications in one call: some hundredths of a second, in which nothing else in Python can run
+_WORK = 1 << 27  # multiplications in one call: it holds Python's lock for some hundredths of a second
 _BLOCK = 1 << 13  # small matrices
 
 

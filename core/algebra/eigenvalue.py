@@ -31,7 +31,7 @@ def largest_eigenvalue(product: Callable[[Floats], Floats], size: int) -> float:
         No convergence.
     """
     start = np.random.default_rng(0).standard_normal(size)
-    # By a power of two near one: the solver takes eigenvalues below some number for zero, in any unit.
+    # Scaled by a power of two to about one: the solver takes eigenvalues below an absolute threshold for zero.
     unit = np.ldexp(1.0, np.frexp(np.abs(product(start)).max())[1])
     operator = LinearOperator((size, size), matvec=lambda y: product(y.ravel()) / unit, dtype=np.float64)
     try:
@@ -44,8 +44,8 @@ def largest_eigenvalue(product: Callable[[Floats], Floats], size: int) -> float:
 def rough_largest_eigenvalue(matrix: Rows, diagonal: Floats) -> float:
     """Estimate the largest eigenvalue of a matrix over its diagonal; of raw scans, up to a fifth too low.
 
-    That is enough to smooth by, where a bound from `largest_eigenvalue` would take four times as many products, for
-    as many steps of conjugate gradients.
+    That is enough for a smoother: a bound from `largest_eigenvalue` would take four times as many products, and save no
+    steps of conjugate gradients.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def rough_largest_eigenvalue(matrix: Rows, diagonal: Floats) -> float:
     float
     """
     y = np.random.default_rng(0).standard_normal(len(diagonal))
-    for _ in range(10):  # leaves less than a tenth
+    for _ in range(10):  # power iterations: the estimate is then within about a tenth, by which it is raised
         y /= np.linalg.norm(y)
         y, before = (matrix @ y[:, None])[:, 0] / diagonal, y
     return float(1.1 * np.linalg.norm(y) / np.linalg.norm(before))

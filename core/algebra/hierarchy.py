@@ -1,4 +1,4 @@
-"""Coarse versions of a symmetric matrix, and the approximate inverses that they make together."""
+"""Algebraic multigrid: coarse versions of a symmetric matrix, and V-cycles as approximate inverses."""
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -14,10 +14,10 @@ from .eigenvalue import rough_largest_eigenvalue
 from .rows import Rows
 
 SMALL = 1000  # unknowns that are solved whole in a tenth of a second
-STRONG = (3e-3, 1e-2, 3e-2, 0.1)  # share of the diagonal from which two unknowns may be one on the next level: of the
-# first about 20 become one, with the others fewer
-_ROUNDING = 1e-12  # share of the largest diagonal entry below which one is rounding
-_SMOOTHED = 0.3  # smoothing reduces the errors whose eigenvalues are at least this share of the largest
+STRONG = (3e-3, 1e-2, 3e-2, 0.1)  # coupling over the diagonal from which unknowns may share an aggregate: about 20
+# by the first one, fewer by the others
+_ROUNDING = 1e-12  # of the largest diagonal entry: smaller ones are rounding error
+_SMOOTHED = 0.3  # relative to the largest eigenvalue: the smoother damps errors of eigenvalues above it
 
 
 @dataclass
@@ -49,7 +49,7 @@ class Level:
     top : float
         Largest eigenvalue, about.
     steps : list of ndarray, (n, 1) float32
-        Lengths of the steps of smoothing: those of Chebyshev's polynomial over the diagonal.
+        Step lengths of the Chebyshev smoother, divided by the diagonal.
     prolongation, extension, restriction : Rows, (n, m), (n, m) and (m, n)
         Interpolation from the next level to this one, in double and single precision, and its transpose.
     known : Known, optional
@@ -82,7 +82,7 @@ def build_levels(
     matrix : csr_array, (n, n)
         Symmetric positive semi-definite.
     slowest : ndarray, (n,)
-        A positive vector that the matrix hardly changes.
+        A positive vector near the null space: its product with the matrix is about zero.
     least : int
         Size at which to stop.
     enough : int
@@ -90,8 +90,8 @@ def build_levels(
     pool, report
         As of `Rows`.
     low : float
-        Eigenvalue up to which all eigenvectors are to be found in the last version. An unknown that has no more by
-        itself, as a part that hangs together with the rest by a thread, is one of them, and not joined with others.
+        Eigenvalue up to which the last version has to represent all eigenvectors. An unknown whose Rayleigh quotient is
+        no larger, such as a part weakly connected to the rest, is one of them: it is not aggregated with others.
 
     Returns
     -------
@@ -105,7 +105,8 @@ def build_levels(
     while matrix.shape[0] > least:
         n, diagonal, rows = matrix.shape[0], matrix.diagonal(), Rows(matrix, pool, report)
         highest, own = diagonal.max(), 1.0 if mass is None else mass.diagonal()
-        # Of one that stands for a whole component there is but rounding. Neither couples with others.
+        # The diagonal of an unknown that is a whole component is rounding error: like those below `low`, it couples
+        # with no other.
         diagonal[diagonal <= np.maximum(_ROUNDING * highest, low * own)] = np.inf
         for share in STRONG:
             part = aggregates(rows, diagonal, share, report)[0]
@@ -138,12 +139,12 @@ def build_levels(
 
 
 def _single(matrix: sparse.csr_array) -> sparse.csr_array:
-    """Return a matrix in single precision, with the same indices in memory: neither may be sorted then."""
+    """Return a matrix in single precision that shares the index arrays: neither may be sorted in place."""
     return sparse.csr_array((matrix.data.astype(np.float32), matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
 def aggregates(matrix: Rows, diagonal: Floats, share: float, report: Report) -> tuple[Ints, Ints]:
-    """Divide the unknowns of a matrix into neighborhoods of roots, of which no two couple strongly.
+    """Aggregate the unknowns of a matrix around roots, no two of which couple strongly.
 
     Returns
     -------
@@ -164,7 +165,7 @@ def aggregates(matrix: Rows, diagonal: Floats, share: float, report: Report) -> 
     first = np.searchsorted(row, np.arange(n, dtype=np.int32))
     rank = np.random.default_rng(0).permutation(n).astype(np.int32)
     waiting, root = rank.copy(), np.zeros(n, dtype=bool)
-    while waiting.max() >= 0:  # roots are those that come first in a random order, again among the rest (Luby 1986)
+    while waiting.max() >= 0:  # a root comes first around it in a random order, round by round (Luby 1986)
         report()
         new = (waiting >= 0) & (waiting == np.maximum.reduceat(waiting[column], first))
         root |= new
@@ -177,7 +178,7 @@ def aggregates(matrix: Rows, diagonal: Floats, share: float, report: Report) -> 
 
 
 def smoothing_steps(top: float, diagonal: Floats) -> list[Floats]:
-    """Return the lengths of the steps of smoothing, two (n,), from the largest eigenvalue over the diagonal."""
+    """Return the step lengths of the smoother, two (n,), from the largest eigenvalue over the diagonal."""
     middle, half = 0.5 * top * (1.0 + _SMOOTHED), 0.5 * top * (1.0 - _SMOOTHED) * np.sqrt(0.5)
     return [1.0 / (length * diagonal) for length in (middle - half, middle + half)]
 
@@ -226,7 +227,7 @@ def approximate_inverse(matrix: sparse.csr_array, pool: ThreadPoolExecutor, repo
     Parameters
     ----------
     matrix : csr_array, (n, n)
-        Symmetric positive semi-definite; it hardly changes constants. No diagonal entry is zero.
+        Symmetric positive semi-definite, constants about in its null space. No diagonal entry is zero.
     pool, report
         As of `Rows`.
 
@@ -253,12 +254,12 @@ def approximate_inverse(matrix: sparse.csr_array, pool: ThreadPoolExecutor, repo
 
 
 def _shorten(level: Level) -> None:
-    """Shorten the steps of smoothing so far that they enlarge no error, which keeps the inverse positive.
+    """Shorten the smoother's steps until they amplify no error, which keeps the preconditioner positive definite.
 
-    Two steps do not if ``1 / first + 1 / second``, here with the diagonal, is more than any eigenvalue, and these are
-    not more than the largest sum over a row of sizes (Gershgorin). The estimated largest eigenvalue may be too low.
+    Two steps amplify none if ``1 / first + 1 / second``, with the diagonal in them, is at least the largest eigenvalue.
+    That is estimated and may be too low, so Gershgorin's bound takes its place: the sum of absolute values in a row.
     """
-    # No step has no end of room.
+    # A step of length zero amplifies nothing: its bound is infinite.
     steps = np.stack([step[:, 0] for step in level.steps])
     room = np.divide(1.0, steps, out=np.full_like(steps, np.inf), where=steps > 0.0).sum(axis=0)
 
@@ -270,7 +271,7 @@ def _shorten(level: Level) -> None:
 
 
 def _cycle(levels: list[Level], inverse: Floats, load: Array) -> Array:
-    """Smooth as much before the correction by the next level as after it, which makes both together symmetric."""
+    """Run a V-cycle, which is symmetric as it smooths as much after the coarse correction as before it."""
     if not levels:
         return (inverse @ load).astype(np.float32)
     level = levels[0]
@@ -285,7 +286,7 @@ def _cycle(levels: list[Level], inverse: Floats, load: Array) -> Array:
 
 
 def smoothed(level: Level, load: Array, result: Array, steps: list[Array]) -> Array:
-    """Return a result improved by some steps over the diagonal."""
+    """Return an approximate solution after some steps of the smoother: residuals times step lengths."""
     for step in steps:
 
         def improve(rows: slice, values: Array, step: Array = step, before: Array = result) -> None:

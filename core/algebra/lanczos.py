@@ -50,7 +50,7 @@ def lift_lowest(
     def multiply(y: Floats) -> Floats:
         nonlocal products
         if products % 20 == 0:
-            report(products / (products + 30.0 * count))  # the number of products is not known before
+            report(products / (products + 30.0 * count))  # how many products it takes is not known in advance
         products += 1
         return matrix @ y.ravel()
 
@@ -63,7 +63,7 @@ def lift_lowest(
         if cut < 0.7 * top:
             degree = max(_DEGREE, round(np.sqrt(top / cut)))
             center, radius = 0.5 * (top + cut), 0.5 * (top - cut)
-        else:  # too few points for a polynomial: a shift to [1, 2], right wherever the cut lies
+        else:  # too few points for a polynomial: a shift to [1, 2], which needs no cut
             degree, center, radius = 1, 2.0 * top, top
 
         def polynomial(y: Floats, degree: int = degree, center: float = center, radius: float = radius) -> Floats:
@@ -80,8 +80,8 @@ def lift_lowest(
                 raise
         cut *= 4.0
 
-    # Of an eigenvalue that a symmetric cloud has several times, Lanczos steps from one start may miss copies: look for
-    # any above the least one found, orthogonal to all found.
+    # Symmetric clouds have multiple eigenvalues, of which Lanczos steps from one start may miss copies: search the
+    # orthogonal complement of the vectors found for any that is lifted above the least of these.
     while True:
 
         def remainder(y: Floats, found: Floats = vectors) -> Floats:

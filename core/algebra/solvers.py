@@ -15,8 +15,8 @@ from .hierarchy import approximate_inverse
 from .rows import PART, Rows
 
 _STEPS = 20_000  # of `solve_symmetric`, at most
-_FEW = 20_000  # unknowns up to which coarse versions, which cost as much as 120 to 150 steps, do not pay
-_PLAIN = 30  # steps without them: where points are fixed all over, these are enough
+_FEW = 20_000  # unknowns up to which multigrid, whose set-up costs 120 to 150 steps, does not pay
+_PLAIN = 30  # steps before multigrid is set up: enough where fixed points lie everywhere
 
 
 @dataclass(frozen=True)
@@ -106,12 +106,12 @@ def solve_symmetric(
     """Solve positive semi-definite equations to nine digits.
 
     Conjugate gradients, preconditioned by the diagonal first, whose steps grow with the root of the number of points,
-    and where this takes long by coarse versions of the matrix, with which ten or so do for any number.
+    and where this takes long by multigrid, with which about ten steps are enough for any number.
 
     Parameters
     ----------
     matrix : csr_array, (m, m)
-        Symmetric positive semi-definite; it hardly changes constants. No diagonal entry is zero.
+        Symmetric positive semi-definite, constants about in its null space. No diagonal entry is zero.
     load : ndarray, (m,) or (m, k)
         In the range of the matrix.
     start : ndarray, (m,) or (m, k), optional
@@ -209,7 +209,7 @@ def solve_columns(matrix: sparse.csr_array, loads: Floats, rtol: float, report: 
 
 
 def _ratio(numbers: Floats, others: Floats) -> Floats:
-    """Return quotients, zero where a column is solved, so that both are."""
+    """Return quotients; zero where both are zero, as in columns that are solved."""
     return np.divide(numbers, others, out=np.zeros_like(numbers), where=others != 0.0)
 
 
@@ -264,7 +264,7 @@ def bounded_quadratic(
         if np.sqrt(free @ free + chopped @ chopped) <= rtol * unit:
             if exact:
                 break
-            gradient, exact = product(x) - right, True  # the sums from step to step have lost digits
+            gradient, exact = product(x) - right, True  # updates step by step have lost digits
             used += 1
             free, chopped = split(gradient, x)
             direction = free

@@ -15,7 +15,7 @@ from .factors import dissect
 from .hierarchy import STRONG, aggregates, smoothing_steps
 from .rows import Rows
 
-_FAINT = 1e-200  # of the largest value: less is not compared
+_FAINT = 1e-200  # relative to the largest value: the convergence of smaller ones is not checked
 _ACCURACY = 1e-3  # largest change in the last step, relative to the value of each point
 _STEPS = 100
 

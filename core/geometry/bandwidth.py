@@ -15,9 +15,9 @@ from .nearest import ENOUGH, GAP, POWER, ROUNDS, Nearest, repeated
 from .quadrics import Quadrics
 
 _NARROWEST = 1.08  # h over the radius of the cells
-_WIDER = 1.3  # each width that is tried over the last one
-_BENT = 0.02  # relative error by a surface that bends within the kernel, by its squared curvatures times h^2
-_STEPS = 4  # to the neighbors' neighbors: how far away a point looks for the deepest place
+_WIDER = 1.3  # factor from each width that is tried to the next
+_BENT = 0.02  # relative error from the surface's curvature within the kernel, over squared curvatures times h^2
+_STEPS = 4  # from neighbors to their neighbors, in search of the place deepest inside the boundary
 
 
 def smoothing_lengths(
@@ -57,7 +57,7 @@ def smoothing_lengths(
         twice over the 40 nearest neighbors so that h varies slowly within a support. Adaptive: as narrow as the points
         and the shape let it be. It starts from 1.08 times the radius of the cells around, in the eighth mean, times the
         factor: the width of a gap in one direction decides, not the number of points in the others. Where a wider
-        kernel would meet its moments better by more than the bend of the surface costs it, it is wider. Even points
+        kernel would reduce the residual of its moments by more than it adds curvature error, it is wider. Even points
         have some 22 others inside it then, random ones 55. A larger factor leaves fewer points that ask for more, so
         that h varies less.
     """
@@ -78,10 +78,11 @@ def smoothing_lengths(
 def _widening(
     nearest: Nearest, normals: Floats, quadrics: Quadrics, cells: Cells, boundary: Boundary, lengths: Floats
 ) -> Floats:
-    """Return the factor of the narrowest h of every point, (m,), whose errors are least, in the eighth mean.
+    """Return the factor on the narrowest h of every point, (m,), of least error, in the eighth mean over neighbors.
 
-    Both errors are known before any weights are: what the moments of a point are off by at least, and what the bend of
-    the surface within the kernel costs, which grows with h^2. Wider kernels are tried as long as their sum falls.
+    Both errors are known before the weights: the least residual of the moments that any weights reach, and the
+    curvature error, from the surface bending within the kernel, which grows with h^2. Wider kernels are tried as long
+    as the sum of both falls.
     """
 
     def error(rows: Ints, factor: float) -> Floats:
@@ -92,7 +93,7 @@ def _widening(
     rows, result, factor = np.arange(len(lengths)), np.ones(len(lengths)), 1.0
     least = error(rows, factor)
     while len(rows):
-        # Where the moments are met, or better than what more of the bend costs, nothing is to be gained.
+        # Stop once the moment error is negligible, or the total error is below the curvature error of the next width.
         open_ = least > np.maximum((_WIDER * factor) ** 2 * bend[rows], factor**2 * bend[rows] + MET)
         rows, least, factor = rows[open_], least[open_], _WIDER * factor
         found = error(rows, factor)
@@ -122,7 +123,7 @@ def depth(nearest: Nearest, inside: Floats) -> Floats:
     """Return how far from a boundary the surface around every point gets, (m,): half the width of a narrow one."""
     deepest = inside[:, 0]
     if np.isfinite(deepest).any():
-        counted = nearest.weight > 1e-12  # neither those on other sheets nor the last one; zero but for rounding
+        counted = nearest.weight > 1e-12  # weights on other sheets, and of the last one, are zero but for rounding
         for _ in range(_STEPS):
             deepest = np.max(deepest[nearest.index], axis=1, where=counted, initial=0.0)
     return deepest

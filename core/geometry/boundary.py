@@ -20,13 +20,13 @@ from .sheets import on_sheet
 
 _BLOCK = 1 << 13  # points looked at at one time
 _ANGLE = np.radians(100.0)  # widest angle without a neighbor, at least
-PROBE, _EMPTY = 8.0, 0.6  # no point within 0.6 of 8 gaps of the place 8 gaps further out
-HOLE = _EMPTY * PROBE  # gaps: radius of holes that are none by chance, whatever their shape
+PROBE, _EMPTY = 8.0, 0.6  # the place 8 gaps outside a boundary point has no point within 0.6 of that distance
+HOLE = _EMPTY * PROBE  # gaps: radius from which holes are not due to chance, whatever their shape
 _REACH = 20.0  # spacings from a boundary at which no kernel sees it
-_PART = 3  # of a short boundary no more than a third: a longer part of a square's has two corners
-_LEVEL = 1.45  # a boundary runs that many standard deviations outside the mean of its candidates
-VOID, SURE = 1.3, 1.6  # usual gaps that a place without a surface is from the next point, at least, and by itself
-_KINK = 2.0  # a fit to one side of a corner must scatter so many times less
+_PART = 3  # a parabola is fitted to a third of a short boundary at most: more of a square's has two corners
+_LEVEL = 1.45  # standard deviations that the boundary lies outside the mean of its candidates
+VOID, SURE = 1.3, 1.6  # gaps from a place off the surface to the nearest point: at least, and enough to tell by itself
+_KINK = 2.0  # factor by which a fit to one side of a corner must scatter less, to be taken
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ def find_boundary(nearest: Nearest, oriented: Floats, gaps: Floats) -> Bools:
     ahead = PROBE * gaps[rows]
     probe = points[rows] + ahead[:, None] * outward_directions(nearest, oriented, rows)
     distance, next_one = nearest.tree.query(probe, workers=cores())
-    # What is nearest there may be sparser: then the surface goes on, as sparse as that.
+    # The nearest points there may be sparser: then the surface continues at their density.
     rows = rows[distance > _EMPTY * np.maximum(ahead, PROBE * gaps[next_one])]
     if len(rows) < FEWEST:
         return result
@@ -183,7 +183,7 @@ def _bends_away(nearest: Nearest, oriented: Floats, rows: Ints) -> Bools:
     """Tell around which points neighbors lie off their sheet or face elsewhere: it goes on there, past an edge."""
     cosine = np.einsum("ikc,ic->ik", oriented[nearest.index[rows]], oriented[rows])
     beside = nearest.apart[rows]
-    near = slice(FEW)  # on coarse balls those further away lie behind
+    near = slice(FEW)  # on a coarsely sampled ball neighbors further away lie on its far side
     beside[:, near] |= np.abs(cosine[:, near]) < SMOOTH
     return np.count_nonzero(beside, axis=1) >= AGREEING
 
@@ -407,7 +407,7 @@ def given_boundary(nearest: Nearest, normals: Floats, distance: Floats) -> Bound
         basis = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=2)
         weighted = np.swapaxes(basis * nearest.weight[block][:, :, None], 1, 2)
         fit = (inverses(weighted @ basis + 1e-9 * np.eye(6)) @ (weighted @ distance[index][:, :, None]))[:, :, 0]
-        # Of the line at this distance; the boundary's own is the next.
+        # The curvature of the level line through the point, and from it that of the boundary, a parallel curve.
         level = -2.0 * (fit[:, 3] + fit[:, 5]) / unit**2
         boundary.curvature[block, 0] = level / np.maximum(1.0 + level * distance[block], 0.5)
         boundary.outward[block, 0] = _tangents(-np.einsum("ick,ik->ic", tangents, fit[:, 1:3]), normals[block])

@@ -17,9 +17,9 @@ from .quadrics import CURVED, along, chords, frames, gathered
 from .sheets import on_sheet
 
 _BLOCK = 1 << 12
-_SAME = 1e-9  # share of the longest cut, or of their product, by which two that differ are one
+_SAME = 1e-9  # relative tolerance: cuts that differ by less of the longest one, or of their product, are the same
 _AT_BOUNDARY = 1e-3  # spacings that a boundary lies off a point, at least
-_CLOSEST = 1e-6  # spacings that a cut lies off its point, at least: by `_SAME`, a longer one hides the others
+_CLOSEST = 1e-6  # spacings to the nearest cut, at least: its inverse is so long that `_SAME` would hide other cuts
 
 
 @dataclass(frozen=True)
@@ -176,8 +176,8 @@ def _caps(cuts: Floats, size: Floats) -> Floats:
 def _intersect(cuts: Floats, gaussian_curvature: Floats, furthest: Floats | float) -> tuple[Floats, Floats, Bools]:
     """Return the area inside all cuts, (k,), its furthest corner, (k, 2), and whether it is closed and no larger, (k,).
 
-    Its corners are the edges of the convex hull of the cuts, which is wrapped around the origin from the longest cut
-    on; an edge that ends in the origin is open.
+    Its corners are dual to the edges of the convex hull of the cuts, which is found by gift wrapping around the origin
+    from the longest cut on; an edge that ends in the origin is open.
     """
     count = len(cuts)
     x, y = (np.append(cuts[:, :, axis], np.zeros((count, 1)), axis=1) for axis in range(2))

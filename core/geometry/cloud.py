@@ -45,7 +45,7 @@ from .voids import find_voids, no_voids
 from .winding import orient_by_winding
 
 _DRAWN = 20  # points that a surface needs at least, to be drawn
-_NARROW = 0.6  # h over the depth of the surface that is too wide
+_NARROW = 0.6  # h over the depth of a narrow surface, see `depth`, from which the kernel is too wide for it
 
 
 @dataclass(frozen=True)
@@ -383,7 +383,8 @@ def divide_components(sample: Sample) -> Sample:
 def fit_surface(sample: Sample, sheets: bool, before: Surface | None = None, changed: Bools | None = None) -> Surface:
     """Fit a quadric around every point, to the neighbors of its own sheet if close sheets are to be kept apart.
 
-    `before` is the surface of the same points before some of them, and neighbors of others, `changed`.
+    With `before`, the surface before some points moved, only points in `changed` are fitted again: those that moved or
+    have neighbors that did.
 
     Returns
     -------
@@ -425,15 +426,15 @@ def remove_noise(surface: Surface, options: LaplacianOptions, near: Floats | Non
     if not decisions.settle("noisy", lambda: bool(noisy.mean() >= MANY)):
         return surface
     first, filling = np.where(noisy, noise, 0.0), noise > FILLING
-    before = _roughly(surface, noise, filling, rounds)
+    before = _median_in_volumes(surface, noise, filling, rounds)
     while noisy.any():
         surface, changed = _project(surface, np.where(filling, first, noise), noisy)
         rows = np.flatnonzero(changed)
         near[rows] = near_misfit(surface.sample.nearest, rows)
         noise = measure_noise(surface, near)
         rounds += 1
-        left = _roughly(surface, noise, filling, rounds)
-        # What does not fall so fast is no noise, such as leaves.
+        left = _median_in_volumes(surface, noise, filling, rounds)
+        # Points whose misfit falls too slowly are left: it is shape and not noise, as of leaves.
         noisy &= (left > LEFT) & (left < FALLING * before)
         before = left
     noise = np.maximum(surface.sample.noise, first)
@@ -441,12 +442,12 @@ def remove_noise(surface: Surface, options: LaplacianOptions, near: Floats | Non
 
 
 def measure_noise(surface: Surface, near: Floats) -> Floats:
-    """Return the noise of all points, (m,), by what quadrics through 20 neighbors miss these by: `noise_level`."""
+    """Return the noise of all points, (m,), from `near_misfit` and the misfits of both fits: see `noise_level`."""
     return noise_level(surface.sample.nearest, near, surface.mixed.misfit, surface.quadrics.misfit)
 
 
-def _roughly(surface: Surface, noise: Floats, filling: Bools, rounds: int) -> Floats:
-    """Return the noise, (m,), and for points that fill volumes, all alike, what quadrics miss their neighbors by."""
+def _median_in_volumes(surface: Surface, noise: Floats, filling: Bools, rounds: int) -> Floats:
+    """Return the noise, (m,), where points fill volumes replaced by their median misfit in spacings."""
     sample = surface.sample
     missed = surface.quadrics.misfit[filling] / sample.nearest.spacing[filling]
     usual = sample.decisions.settle_round("filling", rounds, lambda: float(np.median(missed)) if len(missed) else 0.0)
@@ -576,7 +577,7 @@ def locate_boundary(
 
 
 def _too_few(component: Ints, neighbors: int) -> int:
-    """Return how many points are in components where none has so many neighbors."""
+    """Return how many points are in components that are too small for so many neighbors."""
     size = np.bincount(component)
     return int(size[size <= neighbors].sum())
 

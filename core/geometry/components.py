@@ -7,17 +7,17 @@ from scipy.sparse.csgraph import connected_components
 from ..types import Bools, Floats, Ints
 from .nearest import COUNT, NEXT, Nearest
 
-_GAP = 2.0  # an edge longer than this many reaches to the 8th neighbor is a gap: more join clumps of outliers
+_GAP = 2.0  # an edge over this many distances to the 8th neighbor is a gap; a larger factor joins clumps of outliers
 
 
 def even_reach(nearest: Nearest) -> Floats:
-    """Return the edge that is a gap by how many points there are in any direction, (m,): that of points in rows."""
+    """Return the length from which an edge is a gap, (m,), by the density of points whatever the direction."""
     reach: Floats = _GAP * np.sqrt(NEXT / np.pi) * nearest.spacing
     return reach
 
 
 def gap_reach(nearest: Nearest) -> Floats:
-    """Return the edge that is a gap, (m,), by the distance of the nearest eight, or in rows by how many there are.
+    """Return the length from which an edge is a gap, (m,): by the 8th neighbor, or in rows by `even_reach`.
 
     Where the nearest eight lie along a row, but the neighbors do not, none of these lies across a gap.
     """
@@ -71,7 +71,7 @@ def number_large(label: Ints, large: Bools) -> Ints:
 def label_connected(index: Ints, joined: Bools) -> Ints:
     """Number the components of points whose neighbors, (m, k) int, are joined to them, (m, k) bool."""
     label = np.arange(len(index), dtype=np.int32)
-    # The nearest neighbors make few components, so that hardly a step to the others is left that joins two.
+    # By the nearest neighbors first, for speed: hardly any other edge still joins two components then.
     for some in (slice(0, NEXT), slice(NEXT, None)):
         row, column = np.nonzero(joined[:, some] & (label[index[:, some]] != label[:, None]))
         ends = label[row], label[index[row, some.start + column]]

@@ -12,8 +12,8 @@ from .scaled import ScaledPoints
 
 _WIDEST = 3.0  # spacings: the radius of a disc at most; of a million random points one in ten has an empty disc of 2
 _AT_EDGE = 0.8  # spacings, where nothing is on the other side: half the diagonal of a square, and some more
-_NEAR = 0.5  # radii of an empty disc: a point that near the other end of its diameter closes it; else more are asked
-_OTHERS = 4  # points on the other side of an empty disc, of which one covers what a disc of the widest leaves
+_NEAR = 0.5  # radii: a point this near to the far end of an empty disc's diameter closes it; else more are examined
+_OTHERS = 4  # points examined beyond an empty disc, one of which covers what the widest disc leaves open
 
 
 def disc_radii(nearest: Nearest, normals: Floats, cells: Cells) -> Floats:

@@ -40,7 +40,7 @@ def arc_ahead(left: Floats, right: Floats) -> Floats:
 def bent_ways(
     squared: Floats, left: Floats, right: Floats, cosine: Floats, turn: Floats, sharp: Floats
 ) -> tuple[Floats, Floats]:
-    """Return the squared length of the shortest ways over chords where edges may lie between their ends, and a tilt.
+    """Return the squared length of the shortest paths over chords that may cross edges, and their tilt.
 
     Over the edge in which two planes meet it has two legs: ``s^2 = r^2 - 2 d e / (1 + cosine)``. In the plane of the
     first end its direction is that of the chord with ``-d / (1 + cosine)`` of the second normal added; for an arc see
@@ -104,7 +104,7 @@ def measure_squared_slope(nearest: Nearest, normals: Floats) -> Floats:
 
 
 def heights_of_ends(chord: Floats, normals: Floats, rows: Ints, other: Ints) -> tuple[Floats, Floats, Floats]:
-    """Return of chords from some points, (k,) int, to others, (k, views) int, what `pair_heights` does of pairs.
+    """Return what `pair_heights` does, for chords from some points, (k,) int, to others, (k, views) int.
 
     Parameters
     ----------

@@ -10,9 +10,9 @@ from .cells import Cells
 from .nearest import ON, ROUNDS, Nearest, fading_weights, repeated
 from .noise import FILLING
 
-_OWN = 0.5  # share of what a quadric misses all neighbors by, that one through the own sheet misses it by at most
-_AGREED = 0.8  # mean squared cosine of normals, by which they belong to one smooth surface
-_LONG = 5.0  # circle around a cell over its area: that of rectangles six times as long as wide, of random points 3.3
+_OWN = 0.5  # two sheets: the residual of the own sheet's fit is at most this share of the mixed fit's
+_AGREED = 0.8  # mean squared cosine of normals from which the points belong to one smooth surface
+_LONG = 5.0  # area of the circle around a cell over the cell's: of rectangles 6 by 1; 3.3 of random points
 
 
 class Doubt(IntEnum):
@@ -76,15 +76,16 @@ def likely_causes(nearest: Nearest, normals: Floats, cells: Cells, scatter: Floa
     cells : Cells
         Of the points.
     scatter : ndarray, (2, m)
-        What quadrics through all neighbors, and through those of the own sheet, missed them by before noise was
-        smoothed, in spacings: from `mean_misfits`.
+        Residuals of the fit to all neighbors, and of that to those on the point's own sheet, before noise was smoothed,
+        in spacings: from `mean_misfits`.
 
     Returns
     -------
     ndarray, (m,) int
-        Of `Doubt`. No shape is missed by more than `FILLING`: where all neighbors are, but those of the own sheet are
-        not, there are several sheets; otherwise noise, if the normals agree once it is smoothed, and no surface if they
-        do not. Where the neighbors lie on a surface, these are rows, if cells are long and narrow, or too few points.
+        Of `Doubt`. Where the fit to all neighbors has a large residual, but that to the own sheet has not, there are
+        several sheets. Otherwise a residual above `FILLING`, which no shape has, is noise if the normals agree once it
+        is smoothed, and no surface if they do not. Where it is small, points are in rows if cells are long and narrow,
+        or else too few.
     """
     missed, own = scatter
     filling = missed > FILLING

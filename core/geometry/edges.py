@@ -67,7 +67,7 @@ def find_sides(nearest: Nearest, quadrics: Quadrics) -> Sides:
     Across an edge normals differ more and more with each such fit, on each side they agree; where the surface is round
     or noisy the fit stays much the same. A point next to the edge may end between both sides: in the end it takes the
     normal of the neighbor whose quadric fits best, to this point and to that neighbor's own side. How sure
-    an edge is follows from what is left of the misfit, by as many neighbors as it has more than coefficients.
+    an edge is follows from the share of the misfit that is left, both per degree of freedom of their fits.
 
     Parameters
     ----------

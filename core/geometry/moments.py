@@ -14,9 +14,9 @@ from .sheets import on_sheet
 
 TERMS = 5  # of a point: trace of the second moment, first moment (2), the rest of the second (2)
 _MORE = 64, 160  # neighbors looked at where the kernel holds more than 40; beyond, any sampling is dense enough
-LARGEST = 2.0  # change of the logarithm of a weight: where more is needed the moments cannot be met
+LARGEST = 2.0  # change of a weight's logarithm, at most: where more is needed the moments cannot be met
 _STEPS = 8  # of Newton's method
-MET = 2e-3  # relative error of the moments that is small enough, for a kernel, and for a ridge under the terms
+MET = 2e-3  # relative residual of the moments that is small enough; the ridge of their equations, too
 _BLOCK = 1 << 12
 
 
@@ -58,7 +58,7 @@ def put_terms(x: Floats, y: Floats, terms: Floats) -> None:
 def least_error(
     nearest: Nearest, normals: Floats, areas: Floats, boundary: Boundary, lengths: Floats, rows: Ints
 ) -> Floats:
-    """Return what the moments around some points are off by at least, relatively, whatever the weights, (k,).
+    """Return the least relative residual of the moments around some points, (k,), over all positive weights.
 
     Each point has the weights of the kernel times ``exp(p(u))``, with the quadratic polynomial p of the offset u that
     meets its moments best, as in `balance_weights`, but for itself alone: no other point has a say. The problem is
@@ -130,17 +130,17 @@ def least_error(
 
 
 def _solve(terms: Floats, weights: Floats) -> Floats:
-    """Return how near to ``(1, 0, 0, 0, 0)`` the sums of terms, (5, k, views), can be, by weights, (k, views)."""
+    """Return the least distance from ``(1, 0, 0, 0, 0)`` of sums of terms, (5, k, views), over weights, (k, views)."""
     rows = np.arange(len(weights))
     result, coefficients = np.full(len(rows), np.inf), np.zeros((TERMS, len(rows)), dtype=terms.dtype)
     for step in range(_STEPS + 1):
         power = np.einsum("tik,ti->ik", terms, coefficients)
-        # The other ends of its pairs add as much as a single point.
+        # Half of the limit is left to the other ends of the pairs, which change the same weights.
         weighted = weights * np.exp(np.clip(power, -0.5 * LARGEST, 0.5 * LARGEST))
         products = [weighted * term for term in terms]
         missing = -np.array([product.sum(axis=1) for product in products])
         missing[0] += 1.0
-        # Once met it stays, however long others in the block take: results must not depend on who these are.
+        # A point that has converged is frozen: its result must not depend on the others in its block.
         known = result[rows]
         result[rows] = np.where(known > MET, np.minimum(known, np.linalg.norm(missing, axis=0)), known)
         open_ = result[rows] > MET

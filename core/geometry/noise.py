@@ -8,11 +8,11 @@ from ..types import Floats, Ints
 from .nearest import COUNT, ENOUGH, ROUNDS, Nearest, fading_weights, repeated
 from .quadrics import fit_quadrics
 
-_SHAPE = 1.6  # a fit to 40 that misses so much more: noise misses both nearly alike, an edge by their distance
+_SHAPE = 1.6  # residual of a fit to 40 over that to 20, from which it is shape: noise leaves both alike
 _LEAST = 0.02  # noise below this share of the spacing is left alone
-LEFT = 0.08  # of the spacing: scatter about a fit that counts as none; it shrinks with the root of its neighbors
+LEFT = 0.08  # of the spacing: scatter about a fit that is negligible; it falls with the root of its neighbors
 FILLING = 0.4  # noise above this share fills the neighborhoods as a volume would
-FALLING = 0.9  # share of noise that a round leaves, at most: .3 of one spacing, .86 of three, all of leaves in a volume
+FALLING = 0.9  # share of noise that a round leaves, at most: .3 of one spacing, .86 of three; leaves stay as they are
 LARGEST = 90  # neighbors of the fit that points are projected on, at most: more would round the shape
 _BLOCK = 1 << 12  # points projected at one time
 
@@ -91,7 +91,7 @@ def project_points(tree: cKDTree, rows: Ints, noise: Floats, smallest: int | Non
     # A quadric has six coefficients.
     asked = np.clip(6.0 * (noise[rows] / LEFT) ** 2, ENOUGH, LARGEST)
     many = np.minimum(asked.astype(int), smallest - 1)
-    order = np.argsort(many, kind="stable")  # those who ask for few neighbors do not wait for others' many
+    order = np.argsort(many, kind="stable")  # blocks of similar counts: none is queried for more than it needs
     result = np.empty((len(rows), 3))
 
     def project(part: slice) -> None:

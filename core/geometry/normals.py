@@ -155,7 +155,7 @@ def propagate_signs(nearest: Nearest, normals: Floats) -> tuple[Floats, sparse.c
     n = len(points)
     first, second = near_edges(nearest)
     cosine = np.abs(mirrored_cosine(points, normals, first, second))
-    cost = 1.0 + 1e-9 - np.minimum(cosine, 1.0)  # zero would be no edge
+    cost = 1.0 + 1e-9 - np.minimum(cosine, 1.0)  # csgraph reads a zero cost as no edge
     tree = minimum_spanning_tree(sparse.csr_array((cost, (first, second)), shape=(n, n)))
     graph = tree + tree.T
     component = connected_components(graph, directed=False)[1]

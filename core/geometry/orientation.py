@@ -198,7 +198,7 @@ def _settled(energy: sparse.csr_array) -> Floats:
     In each round those points flip that gain most among their neighbors, no two of which are neighbors.
     """
     sign = np.ones(energy.shape[0])
-    least = 1e-9 * (abs(energy) @ sign)  # below it a gain may be one of rounding
+    least = 1e-9 * (abs(energy) @ sign)  # a smaller gain may be rounding error
     while True:
         gain = -sign * (energy @ sign)
         gaining = gain > least

@@ -10,7 +10,7 @@ from .quadrics import Quadrics, fit_quadrics, heights_over
 
 # Neighbors asked: near ones, and some further away, where the density may be another.
 _WITNESSES = np.array([1, 2, 3, 5, 7, 9, 12, 16, 20, 24, 30, 36])
-SCATTERS = 3.0  # standard deviations of the witness' own neighbors more than that are on its surface, too
+SCATTERS = 3.0  # standard deviations of the witness' own neighbors that are added to the height at which a point is off
 _BLOCK = 1 << 13  # points looked at at one time
 
 

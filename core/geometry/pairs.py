@@ -19,7 +19,7 @@ from .patches import Patch, divide_pairs
 Ends: TypeAlias = Sequence[Sequence[Floats]] | Floats  # quantities of pairs at their first and second points
 
 _BLOCK = 1 << 22  # neighbor candidates held at one time while the pairs are collected
-_GROUPS = 4  # of points with as many candidates, for each doubling of these
+_GROUPS = 4  # groups of points by their number of candidates, for each doubling of it
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class Pairs:
 
         total = np.zeros((count, len(self.points)))
         for patch, (first, second) in zip(self.patches, on_all_cores(sums, self.patches, report), strict=True):
-            for row, own, other in zip(total, first, second, strict=True):  # two axes at once take thrice as long
+            for row, own, other in zip(total, first, second, strict=True):  # both axes at once take three times as long
                 row[patch.rows] += own
                 row[patch.columns] += other
         return total
@@ -121,7 +121,7 @@ def find_pairs(
 
     def keep(rows: Ints, distance: Floats, column: Ints) -> None:
         reach, other = radii[rows, None], radii[column]
-        # A pair is kept by the end that reaches further, which always sees it.
+        # Each pair is stored at the end with the larger radius, whose search always finds it.
         kept = (reach > other) | ((reach == other) & (rows[:, None] < column))
         kept &= distance <= 0.5 * (reach + other)
         many[rows] = np.count_nonzero(kept, axis=1)
@@ -134,7 +134,7 @@ def find_pairs(
         for rows in np.array_split(np.flatnonzero(known), tree.n * COUNT // _BLOCK + 1):
             report()
             keep(rows, nearest.distance[rows], nearest.index[rows])
-    # Counted first, which takes little, so that none is searched for in vain: points with as many are asked together.
+    # Counting is cheap. Points with about as many candidates are then queried together, for hardly more than they have.
     count = tree.query_ball_point(tree.data[open_], radii[open_], workers=cores(), return_length=True)
     group = np.ceil(np.log2(count) * _GROUPS).astype(np.int16)
     order = np.argsort(group, kind="stable")

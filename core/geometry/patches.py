@@ -26,7 +26,7 @@ class Patch:
     counts : ndarray, (k,) int
         How many pairs each first point has.
     ends : csc_array, (l, k)
-        Which second point each pair leads to; its values are no one's.
+        Which second point each pair leads to; its values are scratch for sums.
     """
 
     pairs: slice

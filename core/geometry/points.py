@@ -70,7 +70,7 @@ def check_points(points: ArrayLike) -> Floats:
 
 
 def scale_points(points: Floats, decisions: Decisions | None = None) -> ScaledPoints:
-    """Centre, scale and merge duplicates, so that all that follows is free of units.
+    """Center, scale and merge duplicates, so that all that follows is free of units.
 
     Parameters
     ----------

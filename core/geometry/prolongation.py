@@ -17,7 +17,7 @@ from .subset import voxel_numbers
 _NEIGHBORS = 9  # of the subset around each point
 _BLOCK = 1 << 14  # points worked on at one time
 _CELLS = 64  # along the longest side of the cloud: points go cell by cell, so that neighbors are near in memory
-_STEEP = 10.0  # how much farther than along the surface a point of the subset counts as lying, across it
+_STEEP = 10.0  # factor on distances across the surface, in the search for the nearest point of the subset
 _CLOSE = 1e-6  # of the reach: a point of the subset takes its own value
 _LEVEL = 1e-3  # of the scatter of the neighbors, below which they lie in a row
 _BEYOND = 2.0  # scatters beyond the middle of the neighbors up to which values go on in their slope

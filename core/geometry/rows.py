@@ -49,7 +49,7 @@ def look_across_rows(nearest: Nearest) -> Nearest:
         alone[part] = ~beside.any(axis=1)
         offset = nearest.points[other] - nearest.points[block, None]
         along, every = offset[:, NEXT], np.arange(len(block))
-        # Where points farther along the row do not crowd, they are none of it, but not beside it either.
+        # Points farther along the row that do not crowd are in no row, but do not lie across it, either.
         turned = np.abs(np.einsum("ikc,ic->ik", offset, along)) < SMOOTH * far * far[:, [NEXT]]
         across = (beside & turned).any(axis=1)
         beside[across] &= turned[across]

@@ -10,7 +10,7 @@ from ..types import Array, Bools, Floats, Ints
 
 @dataclass(frozen=True)
 class ScaledPoints:
-    """Distinct points, centred and divided by their root mean square radius.
+    """Distinct points, centered and divided by their root mean square radius.
 
     Attributes
     ----------

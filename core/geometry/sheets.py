@@ -20,8 +20,8 @@ from .pairs import Pairs
 from .patches import Patch
 from .quadrics import Quadrics, chords, eighths, fit_quadrics, in_plane
 
-_LEANING = 0.1  # what normals may be off by, as a share of the distance
-_SEEDS = 9  # nearest neighbors, every two of which make such a plane
+_LEANING = 0.1  # error of the normals: heights may be off by this share of the distance
+_SEEDS = 9  # nearest neighbors, every two of which span a candidate plane with the point
 _BLOCK = 1 << 11
 _AROUND = 1.6  # path along a sheet over the chord, at most: 1.41 across a right angle, in steps that zigzag by an
 # eighth; points that many spacings apart touch
@@ -265,7 +265,7 @@ def separate_sheets(
 
     Normals decide it for most pairs. Where they leave a doubt, two points lie on one sheet if a path of short steps
     joins them along it that is not much longer than their distance. A point that would keep fewer than a dozen pairs,
-    such as one that lies off all sheets, keeps all of them, as in `Nearest.keep`: on so few it would swing for itself.
+    such as one that lies off all sheets, keeps all of them, as in `Nearest.keep`: so few would hardly couple it.
 
     Parameters
     ----------
@@ -318,7 +318,7 @@ def _plainly_on_one_sheet(pairs: Pairs, oriented: Floats, spacing: Floats) -> Bo
 def step_lengths(
     nearest: Nearest, oriented: Floats, settle: Callable[[Callable[[], Ints]], Ints] = lambda find: find()
 ) -> sparse.csr_array:
-    """Return the lengths of the steps along sheets between next neighbors.
+    """Return the lengths of the steps along sheets between adjacent points.
 
     Sharp folds, whose normals join them to nothing, are joined to what is nearest to them.
 
@@ -384,13 +384,13 @@ def ways_along(steps: sparse.csr_array, tree: cKDTree, first: Ints, second: Ints
     longest : ndarray, (k,)
         Greatest length of the path.
     """
-    # Ways start at the end with more pairs, so that fewer are followed.
+    # Search from the end that has more pairs: one search serves all pairs of its start.
     often = np.bincount(first, minlength=tree.n) + np.bincount(second, minlength=tree.n)
     swap = often[second] > often[first]
     first, second = np.where(swap, second, first), np.where(swap, first, second)
     furthest = np.zeros(tree.n)
     np.maximum.at(furthest, first, longest)
-    # Starts near each other share a neighborhood; those of ways as long among them are followed at once.
+    # Starts near each other share a subgraph; among them, those with paths of similar length are searched at once.
     start = tree.indices[furthest[tree.indices] > 0.0]
     start = start[np.lexsort((furthest[start], np.arange(len(start)) // _NEARBY))]
     number = np.empty(tree.n, dtype=np.int64)

@@ -12,14 +12,14 @@ from .rows import look_across_rows
 
 PARTS = 30  # points of a part that others are joined to, and that is no clump of stray points
 _ON = 0.4  # spacings from the surface within which a point lies on it
-_AROUND = slice(1, 25)  # neighbors whose spacing a point's own is compared with, by their lower quartile
-_LONELY = 1.7  # times that a point's third neighbor is away: no witness until it is known to be on the surface
+_AROUND = slice(1, 25)  # neighbors, the lower quartile of whose spacings is the spacing around a point
+_LONELY = 1.7  # times the spacing around to a point's third neighbor: no witness until known to be on the surface
 _ALONE = 2.0  # times the spacing around that a point's third neighbor is away: off the surface by one, it is stray
 _POWER = 4.0  # of that distance: a little farther away tells more than a little higher
-_HIGHEST = 4.0  # height that counts: where points scatter more, as in trees, it tells no more
-_SPARSE = 1.3  # times its spacing: witnesses must show a surface
+_HIGHEST = 4.0  # height that counts, at most: where points scatter more, as in trees, it says nothing more
+_SPARSE = 1.3  # spacing over that around, from which witnesses must show a surface
 _FILLING = 0.6  # scatter around a witness, in spacings, that no surface has
-_ROUGHER = 2.0  # nor has it so much more than the upper quartile of the cloud
+_ROUGHER = 2.0  # scatter over the upper quartile of the cloud's, that no surface has, either
 _ROUNDS = 6  # after which what is on the surface hardly changes
 _NEAR, _GAP = 3, 2.5  # points within so many distances of their third neighbors, at both ends, are joined
 _REACH, _WIDE = 7, 2.0  # and few points to many, within two distances of the seventh neighbor of those
@@ -60,7 +60,7 @@ def stray_scores(nearest: Nearest, report: Report = lambda: None) -> Floats:
         changed = (off != before)[nearest.index].any(axis=1)
         gone = off[nearest.index]
         clean, fewer = nearest.keep(~gone), gone.any(axis=1)
-        # Where all neighbors count, quadrics and heights are those of the start again.
+        # Points all of whose neighbors count get their first quadrics and heights back.
         rows, whole = np.flatnonzero(changed & fewer), np.flatnonzero(changed & ~fewer)
         surface = surface.put(whole, nearest.quadrics.take(whole))
         surface.assign(rows, fit_quadrics(clean.points, clean.index[rows], clean.weight[rows], rows))

@@ -25,7 +25,7 @@ _TRIALS = 8  # of voxels, or of radii
 def blue_noise_subset(points: ArrayLike, count: int, *, progress: Report | None = None) -> Ints:
     """Choose points that are evenly spread over the surface, none close to another: a Poisson-disc subset.
 
-    Of each voxel of a fine grid the point next to its centre is a candidate. Of candidates closer than a radius one
+    Of each voxel of a fine grid the point next to its center is a candidate. Of candidates closer than a radius one
     stays, in an order that looks random but follows from the places alone, so that neither the order of the points nor
     the run makes a difference. The radius is found by trial.
 
@@ -106,7 +106,7 @@ def voxel_numbers(points: Floats, low: Floats, edge: float) -> Ints:
 
 
 def _central(points: Floats, order: Ints, first: Ints, low: Floats, edge: float) -> Ints:
-    """Return of each voxel the point next to the centre; of several equally near the one with the least coordinates."""
+    """Return of each voxel the point next to the center; of several equally near the one with the least coordinates."""
     distance = np.zeros(len(order))
     for axis in range(3):
         place = (points[order, axis] - low[axis]) / edge
@@ -197,7 +197,7 @@ def independent(first: Ints, second: Ints, rank: Array, report: Callable[[], Non
         report()
         beaten = gone.copy()
         beaten[second] = True
-        kept |= ~beaten  # nobody left comes before them
+        kept |= ~beaten  # no candidate that is left comes before them
         taken = kept[first]
         gone[second[taken]] = True
         left = ~(gone[first] | gone[second] | taken)

@@ -16,7 +16,7 @@ from .nearest import ENOUGH, NEXT, ON, ROW, Nearest
 from .quadrics import fit_quadrics, frames
 from .sample import Sample
 
-_TOLD = 30.0  # that of a void that is told though it is no slit; of 300,000 random points none had above 16
+_TOLD = 30.0  # area, in squared gaps, of a void that is reported though no slit; of 300,000 random points 16 at most
 _LONG = 5.0  # twice the standard deviation of a slit along its length, over its radius: 1.4 of the rim of a disc
 
 
@@ -97,7 +97,7 @@ def find_voids(nearest: Nearest, normals: Floats, cells: Cells, gaps: Floats, sc
         usual = np.maximum(usual, cells.radius[nearest.index[there, : NEXT + 1]].mean(axis=1))
     weight = nearest.weight[rows]
     own = np.einsum("ik,ik->i", weight, cells.areas[nearest.index[rows]]) / weight.sum(axis=1)
-    usual *= np.maximum(1.0, gaps[rows] * np.sqrt(np.pi / own) / SURE)  # cells are long and narrow there
+    usual *= np.maximum(1.0, gaps[rows] * np.sqrt(np.pi / own) / SURE)  # long and narrow cells have wider gaps
     wide = cells.radius[rows] > VOID * usual
     rows, usual = rows[wide], usual[wide]
     center = nearest.points[rows] + corner[wide]

@@ -246,7 +246,7 @@ def coupling(alike: Floats, along: Floats, square: Floats, smoothed: float = 0.0
 
 
 def _least(energy: Floats) -> Floats:
-    """Return signs, (m,), that no flip of one patch improves, the best of two beginnings."""
+    """Return signs, (m,), that no flip of one patch improves: the better of two local optima."""
     mutual = energy - np.diag(np.diag(energy))
     mutual = 0.5 * (mutual + mutual.T)
     scale = np.sqrt(np.maximum(np.abs(np.diag(energy)), np.finfo(float).tiny))
@@ -261,7 +261,7 @@ def _least(energy: Floats) -> Floats:
             sign[worst] = -sign[worst]
             field += 2.0 * sign[worst] * mutual[worst]
         total = float(sign @ field)
-        if total > most * (1.0 + 1e-9):  # the propagated signs, where both are alike
+        if total > most * (1.0 + 1e-9):  # the propagated signs come first, and stay where both are equal
             best, most = sign, total
     return best
 

@@ -18,8 +18,8 @@ from .curvature import kernel_integral, uneven
 from .images import mirror, own_images
 
 _FLOOR = 0.5  # least area in units of that of the Voronoi cell: all stay positive
-_DEGREE = 8  # of the polynomial of the first round; half of it of the second, for what the floor changed in the first
-_EVEN = 1e-9  # changes of h, as a share, that are rounding
+_DEGREE = 8  # of the polynomial in the first round; half of it in the second, which corrects what the floor changed
+_EVEN = 1e-9  # relative changes of h below this are rounding error
 _MANY = 1 << 20  # pairs from which a product takes longer than to start threads
 NO_AREA = 1e-300  # of points left out: positive, and negligible in any sum
 
@@ -98,9 +98,9 @@ def solve_areas(cloud: Cloud, distance: Floats, report: Report = lambda: None) -
 def _like_cells(matrix: KernelMatrix, areas: Floats, cloud: Cloud) -> Floats:
     """Scale areas to those of the Voronoi cells, first locally, then by component, (m,).
 
-    Where the surface is sharply curved, distances along it are too inexact for the kernel's integral, which gives too
-    little area. The cells, as wide as a spacing and not as a kernel, decide the area at large; the kernel decides its
-    distribution among the points.
+    Where the surface is sharply curved, errors of the distances along it make the kernel's integral give too little
+    area. The cells, one spacing wide where the kernel is several, set the total; the kernel sets how it is distributed
+    among the points.
     """
     mean = 1.0 / (matrix @ areas)
     ratio = cloud.cell_areas / areas

@@ -13,14 +13,14 @@ from ..types import Array, Floats
 from .laplacian import LaplaceBeltrami
 
 ROUNDS = (0, 1, 2, 4, 8)  # of averaging that are compared; the last reaches as far as halos of tiles allow
-_WINDOWS = 3, 3, 5, 8  # rounds over which a change by averaging is measured: those around say the same, but not chance
-_CHANCE = 1.5  # times what noise alone would change: more is bias
+_WINDOWS = 3, 3, 5, 8  # rounds over which squared changes are averaged: bias varies slowly, chance averages out
+_CHANCE = 1.5  # ratio of a squared change to that expected from noise alone: what is above it is bias
 _NOISE_ROUNDS = 4  # over which noise is measured
 _LOG = 2.0 * np.exp(np.euler_gamma)  # mean of squares of a normal distribution over their geometric mean
-_HIGH = 7.1  # (1 - p)^6 of weights p of a Gaussian: 1 + 7.1 times the sum of their squares remains for a single point
+_HIGH = 7.1  # variance of white noise after (1 - p)^6, p a Gaussian average: 1 + 7.1 times its sum of squared weights
 _STAYS = 1.4  # variance of noise over that of what a fit to 24 neighbors takes away
 _GAUSSIAN = 0.8  # variance of a Gaussian that leaves as much noise as the weights of the pairs, over that of these
-_LEAST = 1e-3  # noise below this share of the spacing is none, such as that of rounded coordinates
+_LEAST = 1e-3  # of the spacing: less noise is ignored, such as that of rounded coordinates
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Averages:
         bent = np.einsum("ij,ij->i", off_neighbors(laplacian, laplacian.apply(points, raw=True), 2), laplacian.normals)
         height = bent * laplacian.areas / diagonal
         squares = height**2 / (1.0 + _HIGH * uneven) + _STAYS * moved**2
-        # The geometric mean: few points at an edge are no noise.
+        # The geometric mean is robust: a few large values, at points along an edge, are no noise.
         noise = _LOG * np.exp(self._around(np.log(squares + 1e-12 * area), _NOISE_ROUNDS))
         self.noisy = noise > _LEAST**2 * area
         self._unit = noise / (8.0 * np.pi * area**2)  # of variances; widths are in units of the area
@@ -73,17 +73,18 @@ class Averages:
         self._wider = np.where(wider > 0.0, wider, 1.0)
 
     def of(self, values: Floats) -> list[Floats]:
-        """Return values at the points, (n, ...), averaged as often as `ROUNDS` says, of the other side negated."""
+        """Return values, (n, ...), after each number of averages in `ROUNDS`; values of the other side negated."""
         shape, result = values.shape, [values.reshape(len(values), -1)]
         for before, after in itertools.pairwise(ROUNDS):
             result.append(repeated(self._pairs, result[-1], after - before))
         return [each.reshape(shape) for each in result]
 
     def settle(self, averaged: list[Floats]) -> Settled:
-        """Return of averages of a curvature, (n, k) each, the one of least error, or what lies between two of them.
+        """Return the average of a curvature, from those of `of`, (n, k) each, of least error, or between two of them.
 
-        A step to more averaging changes values by noise, which is known beforehand, and else by bias. That grows with
-        the width, so that it shows what bias there was before. Of both follows the share of the step that leaves least.
+        A step to more averaging changes values by noise, whose variance is known in advance, and by bias. Bias is
+        proportional to the width, so the change also tells the bias before the step. Both give the fraction of the step
+        that has the least mean squared error.
         """
         width = [self._quadric + rounds * self._wider for rounds in ROUNDS]
         variance = [self._unit / each**3 for each in width]
@@ -112,7 +113,7 @@ class Averages:
 def off_neighbors(laplacian: LaplaceBeltrami, values: Floats, rounds: int) -> Floats:
     """Return how far values are off the mean of their neighbors by the weights of the stiffness, (n, k).
 
-    Twice of it is of fourth order for what varies with the place, and all of what changes from point to point.
+    Applied twice it is a high-pass filter: of fourth order in the spacing for smooth functions, while noise passes.
     """
     weight = laplacian.stiffness.diagonal()
     weight = np.where(weight > 0.0, weight, 1.0)[:, None]

@@ -6,7 +6,7 @@ from ..geometry import CURVED
 from ..kernel import SECOND_MOMENT
 from ..types import Floats
 
-_UNEVEN = 0.01  # gain of an integral over the kernel, from h that varies, up to which the expansion holds
+_UNEVEN = 0.01  # relative change of a kernel's integral by varying h, up to which its expansion holds
 
 
 def kernel_integral(lengths: Floats, gaussian: Floats) -> Floats:

@@ -12,9 +12,9 @@ from ..types import Floats
 from .averaging import Averages, Settled, off_neighbors
 from .laplacian import LaplaceBeltrami
 
-_OPERATOR = 0.35  # of what changes from point to point in the operator's curvature, at least as much noise is left
-_AROUND = 2  # rounds of averaging over which it is compared with that of quadrics
-_DECIDES = 0.5  # of a curvature's size: noise that leaves more decides it
+_OPERATOR = 0.35  # share of the high-frequency part of the operator's curvature: at least as much noise is left in it
+_AROUND = 2  # rounds of averaging over which it is compared with the curvature of quadrics
+_DECIDES = 0.5  # scatter over a curvature's size from which noise decides it
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ def mean_curvature(laplacian: LaplaceBeltrami) -> Floats:
         Mean of the two principal curvatures [1 / L]. Without noise it is that of the operator, which has the least
         bias. Noise scatters that more than the `LaplaceBeltrami.quadric_mean_curvature`, which then takes its place, as
         it does where the kernel extends beyond a boundary; and the more noise there is, the more often that is averaged
-        over the neighbors, as long as the scatter that goes is more than the bias that comes.
+        over the neighbors, as long as this removes more scatter than it adds bias.
 
     See Also
     --------
@@ -116,7 +116,7 @@ def _settled_mean(laplacian: LaplaceBeltrami, averages: Averages) -> Settled:
     rough = off_neighbors(laplacian, vector, 2)
     high = np.einsum("ij,ij->i", rough, normals)
     own, quadric = np.einsum("ij,ij->i", vector, normals) - high, laplacian.quadric_mean_curvature
-    # At a boundary the natural operator takes the surface as level across it.
+    # The Neumann condition takes the surface as flat across a boundary: near one quadrics alone count.
     change = np.where(near, 0.0, own - quadric)
     chance = _OPERATOR * averages.mean_square(np.where(near, 0.0, high)[:, None], _AROUND)
     differs = averages.mean_square(change[:, None], _AROUND)

@@ -17,11 +17,11 @@ from ..kernel import inverse_ratio, symbol
 from ..memory import check_mode_memory
 from ..types import Floats, Ints, Progress, Report
 
-TOLERANCE = 2e-7  # leaves eigenvalues right to ten digits and more, for their errors go by its square
+TOLERANCE = 2e-7  # eigenvalues are then right to ten digits and more: their errors are quadratic in the residual
 
-_FEW = 0.01  # modes over points up to which coarse versions pay: of 6,000 to 50,000 random points
-_ALIKE = 1e-4  # share by which the sizes of entries differ that are the same on a symmetric shape
-_FLAT = 4.0  # the symbol hardly rises beyond
+_FEW = 0.01  # modes over points up to which multigrid is faster than Lanczos: of 6,000 to 50,000 random points
+_ALIKE = 1e-4  # relative difference up to which entries count as of one size, as on a symmetric shape
+_FLAT = 4.0  # k h beyond which the symbol is nearly constant
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def solve_spectrum(
 
     report()
     order, root, matrix = symmetric_form(stiffness, points, areas, component, report)
-    # In eigenvalues near one, by a power of two: solvers take those below some number for zero, in any unit.
+    # Scaled by a power of two to eigenvalues near one: solvers take those below an absolute threshold for zero.
     unit = np.ldexp(1.0, np.frexp(matrix.diagonal().max())[1])
     matrix.data /= unit
     weyl = 4.0 * np.pi * count / areas.sum() / unit
@@ -105,7 +105,7 @@ def solve_spectrum(
             f" of {tolerance:g}. Ask for fewer modes, or raise the tolerance."
         )
     vectors = root[:, None] * vectors
-    # The first of the largest entries is positive: on a symmetric shape rounding would choose one among equals.
+    # Signs by the first of the largest entries: among equals, on a symmetric shape, rounding must not choose.
     sizes = np.abs(vectors)
     first = np.argmax(sizes >= (1.0 - _ALIKE) * sizes.max(axis=0), axis=0)
     result = np.zeros((n, count))

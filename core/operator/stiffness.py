@@ -27,7 +27,7 @@ class Stiffness:
         Symmetric weights of the images in one boundary that the matrix holds, those of points in their own image on the
         diagonal. (An image of an image, across a corner, has the point's value whatever holds at the boundary.)
     residual : ndarray, (m,)
-        What the moments of the weights around each distinct point are off by, relatively.
+        Relative residual of the moments of the weights around each distinct point.
     widths : ndarray, (m,)
         Smoothing length of the kernel whose fourth moment the weights have; zero for no symbol correction.
     """
@@ -194,7 +194,7 @@ def _symmetric(scaled: ScaledPoints, first: Ints, second: Ints, values: Floats, 
         row = scaled.inverse[known]
         spread = sparse.csr_array((1.0 / scaled.copies[row], (known, row)), shape=(n, m))
         half = sparse.csr_array((values, (first, second)), shape=(m, m))
-        alone = sparse.diags_array(own, dtype=np.float64)  # numpy counts nothing, without weights, in whole numbers
+        alone = sparse.diags_array(own, dtype=np.float64)  # np.bincount of nothing gives integers, even with weights
         return (spread @ (half + half.T + alone) @ spread.T).tocsr()
     caller = scaled.first.astype(np.int32)
     ends = (np.concatenate([caller[end], caller]) for end in (first, second))

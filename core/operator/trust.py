@@ -20,7 +20,7 @@ _CAUSES = {  # with what helps
 
 
 def measure_trust(cloud: Cloud, residual: Floats) -> Floats:
-    """Return how reliable results are, (m,), from 0 to 1, by what moments are off by, (m,), and by misfits."""
+    """Return how reliable results are, (m,), from 0 to 1, by residuals of the moments, (m,), and misfits of fits."""
     return 1.0 / (1.0 + (residual / _FAR) ** 2 + (cloud.misfit / (_MISSED * cloud.spacing)) ** 2)
 
 

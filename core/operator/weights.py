@@ -15,8 +15,8 @@ from ..types import Floats, Ints, Report
 from .curvature import second_moment, uneven
 
 _ROUNDS = 16  # of the solver, at most
-_SMALLEST = 1e-6  # error of the moments that is none: with a larger one results would depend on where a cloud lies
-_FASTEST = 2.5  # bound of the eigenvalues of the equations over those of single points: 2, but these change on the way
+_SMALLEST = 1e-6  # residual of the moments that is solved for: by a larger one, results would change with the origin
+_FASTEST = 2.5  # bound of the preconditioned eigenvalues: 2, and a margin, as the equations change on the way
 
 
 @dataclass(frozen=True)
@@ -80,10 +80,10 @@ def balance_weights(
     goal = np.zeros((len(areas), TERMS))
     goal[:, 0] = 1.0
     terms, step = np.zeros_like(goal), np.zeros_like(goal)
-    slowest = _FASTEST / (1.0 + 0.25 * _ROUNDS**2)  # what so many rounds reduce to 1 / cosh(4)
+    slowest = _FASTEST / (1.0 + 0.25 * _ROUNDS**2)  # so many rounds reduce its component to 1 / cosh(4)
     rates = chebyshev_steps(slowest, _FASTEST)
     for number in range(_ROUNDS + 1):
-        if number < 2:  # from the kernel's weights to nearly the end in the first round, half a step
+        if number < 2:  # the first round, half a step, goes nearly all the way: later Jacobians differ little
             found, curvature = moments.with_curvature(terms)
             inverse = inverses(0.5 * curvature + MET * np.eye(TERMS))
         else:
@@ -171,7 +171,7 @@ class _Moments:
         return self._sums(weighted, TERMS)
 
     def with_curvature(self, terms: Floats) -> tuple[Floats, Floats]:
-        """Return them, and the second derivatives of the entropy for the coefficients of each point, (m, 5, 5)."""
+        """Return the moments, and the Hessian of the entropy by the coefficients of each point, (m, 5, 5)."""
         places, terms = [(i, j) for i in range(TERMS) for j in range(i + 1)], terms.T.copy()
 
         def products(patch: Patch) -> list[list[Floats]]:

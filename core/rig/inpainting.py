@@ -167,7 +167,7 @@ def inpaint_labels(laplacian: LaplaceBeltrami, known: ArrayLike, labels: ArrayLi
     first, second = surface.stiffness.nonzero()
     steps = np.linalg.norm(surface.points[first] - surface.points[second], axis=1)
     beside = first != second
-    # Points that lie on each other are joined, too: a step of nothing would be none.
+    # Coincident points are joined, too: csgraph reads a zero length as no edge.
     lengths = sparse.csr_array(
         (np.maximum(steps, np.finfo(float).tiny)[beside], (first[beside], second[beside])),
         shape=surface.stiffness.shape,

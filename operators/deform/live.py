@@ -198,7 +198,7 @@ def update_all(scene, depsgraph, wanted):
 
 
 def _note(obj, trouble, pose=None):
-    """Keep an error of an object for the panel, and the pose that caused it."""
+    """Record an object's error, which the panel shows, and the pose that caused it: that pose is not tried again."""
     followed = _followed[obj.session_uid]
     followed.trouble, followed.troubled = trouble, None if pose is None else pose.numbers
 
