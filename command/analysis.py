@@ -1,11 +1,18 @@
 """What an analysis computes from arrays, for the command line and for Blender's tools."""
 
+from __future__ import annotations
+
 from dataclasses import asdict, replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from . import core, quantities
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from tools.tool import Array, Progress
 
 WRITE_LIMIT = 50  # default number of modes written as attributes: each takes 4 bytes per point in the file
 
@@ -13,8 +20,8 @@ WRITE_LIMIT = 50  # default number of modes written as attributes: each takes 4 
 class Built(NamedTuple):
     """An operator and the mean curvature computed by it."""
 
-    laplacian: "core.LaplaceBeltrami"
-    curvature: "core.measure.MeanCurvature"
+    laplacian: core.LaplaceBeltrami
+    curvature: core.measure.MeanCurvature
 
     @property
     def mean_curvature(self) -> np.ndarray:
@@ -22,17 +29,23 @@ class Built(NamedTuple):
         return self.curvature.values
 
     @property
-    def notices(self) -> list:
+    def notices(self) -> list[str]:
         """Notices about the operator and about the curvature."""
         return [*self.laplacian.notices, *self.curvature.notices]
 
     @property
-    def measures(self) -> dict:
+    def measures(self) -> dict[str, Array]:
         """Results at the points, by the names of their attributes."""
         return {row.attribute: row.of(self) for row in quantities.rows_of("analyze")}
 
 
-def build(points, options, boundary, left_out, progress) -> Built:
+def build(
+    points: Array,
+    options: core.LaplacianOptions | core.PaperOptions,
+    boundary: Array | None,
+    left_out: Array,
+    progress: Progress,
+) -> Built:
     """Build the operator of points by the method of the options; the paper's has no boundary.
 
     Parameters
@@ -46,7 +59,7 @@ def build(points, options, boundary, left_out, progress) -> Built:
     progress : callable
         Called as ``progress(stage, fraction)``.
     """
-    given = {"left_out": left_out, "progress": progress}
+    given: dict[str, Any] = {"left_out": left_out, "progress": progress}
     if isinstance(options, core.PaperOptions):
         laplacian = core.paper.build_laplacian(points, **asdict(options), **given)
     else:
@@ -56,7 +69,7 @@ def build(points, options, boundary, left_out, progress) -> Built:
     return Built(laplacian, core.measure.measure_mean_curvature(laplacian))
 
 
-def oriented(built, orientation) -> Built:
+def oriented(built: Built, orientation: Array) -> Built:
     """Return the same with normals turned to the side of some vectors, (n, 3)."""
     laplacian = built.laplacian.toward(orientation)
     kept = np.einsum("ij,ij->i", laplacian.normals, built.laplacian.normals) > 0.0
@@ -64,7 +77,7 @@ def oriented(built, orientation) -> Built:
     return Built(laplacian, replace(built.curvature, values=values))
 
 
-def floating_notices(out) -> list:
+def floating_notices(out: Array) -> list[str]:
     """Return a notice of the splats that were left out, if any."""
     if not len(out):
         return []
@@ -74,7 +87,7 @@ def floating_notices(out) -> list:
     ]
 
 
-def resolved_modes(laplacian, modes: int, progress):
+def resolved_modes(laplacian: core.LaplaceBeltrami, modes: int, progress: Progress) -> tuple[core.Spectrum, list[str]]:
     """Compute modes of an operator, or as many of them as the points resolve, with a notice.
 
     Parameters
@@ -98,7 +111,9 @@ def resolved_modes(laplacian, modes: int, progress):
         return laplacian.eigenpairs(error.resolved, progress=progress), [notice]
 
 
-def continued(spectrum, areas, points, earlier):
+def continued(
+    spectrum: core.Spectrum, areas: Array, points: Array, earlier: tuple[core.Spectrum, Array] | None
+) -> tuple[core.Spectrum, Array, tuple[core.Spectrum, Array]]:
     """Match modes to those of the frame before.
 
     Parameters
@@ -127,17 +142,17 @@ def continued(spectrum, areas, points, earlier):
     return spectrum, overlaps, (spectrum, points)
 
 
-def total_area(measures) -> float:
+def total_area(measures: Mapping[str, Array]) -> float:
     """Return the area of the whole surface."""
     return float(measures[quantities.AREA].sum())
 
 
-def trusted_area(measures) -> float:
+def trusted_area(measures: Mapping[str, Array]) -> float:
     """Return the area of the parts whose results are not in doubt."""
     return float(measures[quantities.AREA][measures[quantities.DOUBT] == 0].sum())
 
 
-def counts(measures) -> dict:
+def counts(measures: Mapping[str, Array]) -> dict[str, int]:
     """Return the numbers of components, boundary points and points left out."""
     component = measures[quantities.COMPONENT]
     return {
@@ -147,7 +162,7 @@ def counts(measures) -> dict:
     }
 
 
-def figures(measures, spectrum) -> dict:
+def figures(measures: Mapping[str, Array], spectrum: core.Spectrum | None) -> dict[str, Any]:
     """Return what the command line prints of an analysis; `spectrum` may be None."""
     return {
         "points": len(measures[quantities.AREA]),
@@ -158,7 +173,7 @@ def figures(measures, spectrum) -> dict:
     }
 
 
-def arrays(place, built, spectrum) -> dict:
+def arrays(place: Array, built: Built, spectrum: core.Spectrum | None) -> dict[str, Array]:
     """Return all arrays of an analysis, in double precision, in lengths and axes of the world.
 
     Those of the stiffness matrix have the names of scipy.sparse.save_npz, so that scipy.sparse.load_npz reads it.

@@ -1,13 +1,21 @@
 """Verbs of the command line that need no object: summaries of splat files, and deformation of points and splats."""
 
+from __future__ import annotations
+
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import core
 from .verb import ONE_LINE, Verb
+
+if TYPE_CHECKING:
+    from argparse import ArgumentParser, Namespace
+
+    from tools.tool import Array
 
 _SHARES = (0.01, 0.5, 0.99)  # quantiles that are printed
 _FLAT = 0.3  # ratio of the shortest to the middle axis below which a splat is flat
@@ -21,11 +29,11 @@ class SplatInfo(Verb):
     description = f"Summarize files of Gaussian splats. {ONE_LINE}"
     inputs = "files of splats"
 
-    def run(self, path, arguments, output):
+    def run(self, path: Path, arguments: Namespace, output: Path | None) -> dict[str, Any]:
         splats = core.splats.read_splats(path)
         axes = np.sort(splats.scales, axis=1)
 
-        def quantiles(values):
+        def quantiles(values: Array) -> list[float]:
             return [float(f"{value:.6g}") for value in np.quantile(values, _SHARES)]
 
         return {
@@ -50,7 +58,7 @@ class Deform(Verb):
     outputs = core.files.WRITABLE
     reads = ("handles",)
 
-    def add_options(self, parser):
+    def add_options(self, parser: ArgumentParser) -> None:
         parser.add_argument(
             "--handles",
             type=Path,
@@ -60,7 +68,7 @@ class Deform(Verb):
             ' in balls or by "indices", moved by "shift", "matrix" (4 x 4) or "positions"',
         )
 
-    def run(self, path, arguments, output):
+    def run(self, path: Path, arguments: Namespace, output: Path | None) -> dict[str, Any]:
         if output is None:
             raise core.PointCloudError("Nothing would be written. Give --out or --out-dir.")
         wanted = _read_handles(arguments.handles)
@@ -68,7 +76,7 @@ class Deform(Verb):
         splats = None if isinstance(given, core.files.PointTable) else given
         if splats is not None and output.suffix.lower() != ".ply":
             raise core.PointCloudError(f"Splats cannot be written to {output}. Let its name end in .ply.")
-        points = given.points if splats is None else splats.positions
+        points = given.points if isinstance(given, core.files.PointTable) else given.positions
         handles, goal = _moves(wanted, points)
         anchors = [_members(one, points, "anchors") for one in wanted.get("anchors", [])]
         out = core.splats.floating_rows(splats) if splats is not None else ()
@@ -76,16 +84,16 @@ class Deform(Verb):
         deformer = core.deform.CoarseDeformer(laplacian, handles, np.unique(np.concatenate(anchors)) if anchors else ())
         moved = deformer.solve(goal)
         written = []
-        if splats is None:
+        if isinstance(given, core.files.PointTable):
             written = core.files.write_points(output, replace(given, points=moved), double=not given.single)
         else:
-            core.splats.write_splats(output, splats.deformed(moved, deformer.gradients(moved)))
+            core.splats.write_splats(output, given.deformed(moved, deformer.gradients(moved)))
         farthest = float(np.linalg.norm(moved - points, axis=1).max())
         notices = [*given.notices, *deformer.notices, *written]
         return {"points": len(points), "farthest": farthest, "left_out": len(out), "notices": notices}
 
 
-def _read_handles(path):
+def _read_handles(path: Path) -> dict[str, Any]:
     """Read handles and anchors from a JSON file."""
     try:
         wanted = json.loads(Path(path).read_text(encoding="utf-8"))
@@ -102,7 +110,7 @@ def _read_handles(path):
     return wanted
 
 
-def _moves(wanted, points):
+def _moves(wanted: dict[str, Any], points: Array) -> tuple[Array, Array]:
     """Return the indices of the handles, and their target positions."""
     members = [_members(one, points, "handles") for one in wanted["handles"]]
     goals = [_goal(one, points[rows]) for one, rows in zip(wanted["handles"], members, strict=True)]
@@ -112,7 +120,7 @@ def _moves(wanted, points):
     return rows, np.concatenate(goals)
 
 
-def _members(one, points, name):
+def _members(one: dict[str, Any], points: Array, name: str) -> Array:
     """Return the indices of the points of a handle: listed ones, or those in a ball."""
     if "indices" in one:
         rows = _numbers(one["indices"], (-1,), "indices")
@@ -130,7 +138,7 @@ def _members(one, points, name):
     raise core.PointCloudError(f'One of the {name} names no points. Give "indices", or "center" and "radius".')
 
 
-def _goal(one, points):
+def _goal(one: dict[str, Any], points: Array) -> Array:
     """Return the target positions of the points of a handle."""
     if "positions" in one:
         return _numbers(one["positions"], points.shape, "positions")
@@ -142,7 +150,7 @@ def _goal(one, points):
     raise core.PointCloudError('One of the handles goes nowhere. Give "shift", "matrix" or "positions".')
 
 
-def _numbers(given, shape, name):
+def _numbers(given: Any, shape: tuple[int, ...], name: str) -> Array:
     """Return numbers of a JSON file as an array; -1 in a shape stands for any length."""
     try:
         array = np.array(given, dtype=np.float64)

@@ -3,21 +3,31 @@
 Beside the kinds of files that core reads and writes there is one more where Blender is, which registers it here.
 """
 
+from __future__ import annotations
+
 from argparse import Namespace
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from . import core, quantities
 from .settings import as_place, place
 
+if TYPE_CHECKING:
+    from argparse import ArgumentParser
+    from collections.abc import Callable, Mapping
+    from pathlib import Path
+
+    from tools.tool import Array
+
+Given: TypeAlias = "core.files.PointTable | core.splats.Splats"  # what a file holds
 _FILE_NORMAL = "normal"  # the attribute that files call nx ny nz
 _BLEND = ".blend"
 _FOR_BLENDER = (
     "Files of Blender are read and written by Blender itself: blender --command meshfree takes the same verbs."
 )
-_kinds = {}  # further ones, by their endings
+_kinds: dict[str, Kind] = {}  # further ones, by their endings
 
 
 class Kind(NamedTuple):
@@ -42,60 +52,60 @@ class Kind(NamedTuple):
         left of one face.
     """
 
-    add_options: Any
-    read: Any
-    own: Any
-    close: Any
+    add_options: Callable[[ArgumentParser], None]
+    read: Callable[[Path, str, str, Namespace], Given]
+    own: Callable[[str, Given, Namespace], Given]
+    close: Callable[[Array, Array], tuple[list[Array], int]]
 
 
-def register(ending, kind):
+def register(ending: str, kind: Kind) -> None:
     """Add a kind of file."""
     _kinds[ending] = kind
 
 
-def unregister(ending):
+def unregister(ending: str) -> None:
     """Remove a kind of file."""
     del _kinds[ending]
 
 
-def kinds() -> dict:
+def kinds() -> dict[str, Kind]:
     """Return the kinds of files beside those of core, by their endings."""
     return dict(_kinds)
 
 
-def kind_of(path):
+def kind_of(path: Path | None) -> Kind | None:
     """Return the kind of a file, if it is one beside those of core; else None."""
     return None if path is None else _kinds.get(path.suffix.lower())
 
 
-def inputs() -> tuple:
+def inputs() -> tuple[str, ...]:
     """Return the endings of files that are read."""
     return (*core.files.READABLE, *core.files.SPLATS, *_kinds)
 
 
-def outputs() -> tuple:
+def outputs() -> tuple[str, ...]:
     """Return the endings of files that results are written to."""
     return (*_kinds, *core.files.WRITABLE, ".npz")
 
 
-def hint(path) -> str:
+def hint(path: Path) -> str:
     """Return where a file of this name could be read and written, if it is one of Blender and this is another place."""
     return f" {_FOR_BLENDER}" if path.suffix.lower() == _BLEND and not _kinds else ""
 
 
-def place_or_object(text):
+def place_or_object(text: str) -> str | Array:
     """Parse X,Y,Z as a position, (3,), or take a text as the name of an object, where there are files of such."""
     return text if _kinds and as_place(text) is None else place(text)
 
 
-def with_own(arguments, given):
+def with_own(arguments: Namespace, given: Given) -> Namespace:
     """Return arguments in which the settings that the command line does not give are those of an object, if any."""
     own = {} if given.owner is None else given.owner.settings
     values = vars(arguments)
     return Namespace(**values | {name: own[name] for name in own.keys() & values.keys() if values[name] is None})
 
 
-def read_file(path, columns="", las=None):
+def read_file(path: Path, columns: str = "", las: core.files.LasChoices | None = None) -> Given:
     """Read a file, as splats if it holds splats.
 
     Parameters
@@ -118,7 +128,7 @@ def read_file(path, columns="", las=None):
     return core.splats.read_file(path, lambda path: core.files.read_points(path, las=choices))
 
 
-def positions(given):
+def positions(given: Given) -> Array:
     """Return the positions of the points or splats that a file holds, (n, 3)."""
     return given.positions if isinstance(given, core.splats.Splats) else given.points
 
@@ -141,21 +151,21 @@ class Cloud:
         Splats that operators leave out.
     """
 
-    def __init__(self, path, given, floaters=True):
+    def __init__(self, path: Path, given: Given, floaters: bool = True) -> None:
         self.path, self.given, self.notices = path, given, list(given.notices)
         self.splats = given if isinstance(given, core.splats.Splats) else None
         places = np.asarray(positions(given), dtype=np.float64)
         self.place = core.files.choose_origin(places, degrees=getattr(given, "degrees", False))
         self.points = core.check_points(places - self.place)
-        self.out = core.splats.floating_rows(given) if floaters and self.splats is not None else np.arange(0)
+        self.out = core.splats.floating_rows(self.splats) if floaters and self.splats is not None else np.arange(0)
 
     @property
-    def columns(self) -> dict:
+    def columns(self) -> dict[str, Array]:
         """Other numbers of the points, by name."""
-        return {} if self.splats is not None else self.given.attributes
+        return {} if isinstance(self.given, core.splats.Splats) else self.given.attributes
 
     @property
-    def owner(self):
+    def owner(self) -> Any:
         """The object that the points belong to, as of `Kind`, whose file has others that options name."""
         if self.given.owner is None:
             raise core.PointCloudError(
@@ -164,19 +174,19 @@ class Cloud:
         return self.given.owner
 
     @property
-    def groups(self):
+    def groups(self) -> dict[str, Array]:
         """Weights by the names of groups, as of `Kind`; none in files of points."""
         return {} if self.given.owner is None else self.given.owner.groups
 
-    def has(self, name) -> bool:
+    def has(self, name: str) -> bool:
         """Whether there is a group or a column of a name."""
         return name in self.groups or name in self.columns
 
-    def members(self, name, what):
+    def members(self, name: str, what: str) -> Array:
         """Return the points, (n,) bool, with weights or numbers above 0 in the group or column that an option names."""
         return (self.groups[name] if name in self.groups else self.numbers(name, what)) > 0
 
-    def numbers(self, name, what):
+    def numbers(self, name: str, what: str) -> Array:
         """Return the column of a name, (n,), that an option asks for."""
         if name not in self.columns:
             known = ", ".join([*self.columns, *self.groups]) or "none"
@@ -186,17 +196,17 @@ class Cloud:
             )
         return self.columns[name]
 
-    def taken(self, kept):
+    def taken(self, kept: Array) -> Given:
         """Return the file's content of some of the points, (n,) bool."""
         owner = None if self.given.owner is None else self.given.owner.taken(kept)
-        if self.splats is not None:
-            return replace(_some(self.splats, kept), owner=owner)
+        if isinstance(self.given, core.splats.Splats):
+            return replace(_some(self.given, kept), owner=owner)
         colors = None if self.given.colors is None else self.given.colors[kept]
         columns = {name: values[kept] for name, values in self.columns.items()}
         return replace(self.given, points=self.given.points[kept], attributes=columns, colors=colors, owner=owner)
 
 
-def moved(given, points, matrix, place):
+def moved(given: Given, points: Array, matrix: Array, place: Array) -> Given:
     """Return what a file holds after a motion.
 
     Parameters
@@ -223,14 +233,20 @@ def moved(given, points, matrix, place):
             name in (_FILE_NORMAL, quantities.ORIENTATION) or quantities.quantity(name).is_direction
         ):
             columns[name] = values @ turn
-    if np.ndim(columns.get(core.files.SCANNER)) == 2:
+    if core.files.SCANNER in columns and np.ndim(columns[core.files.SCANNER]) == 2:
         # Relative to the points, whose own motion is known, so that no digits are lost far from the origin.
         away = columns[core.files.SCANNER] - given.points
         columns[core.files.SCANNER] = after + away @ linear.T
     return replace(given, points=after, attributes=columns)
 
 
-def write(path, given, results, arrays=None, numbers=None) -> list:
+def write(
+    path: Path,
+    given: Given,
+    results: Mapping[str, Array],
+    arrays: Mapping[str, Array] | None = None,
+    numbers: Mapping[str, Array] | None = None,
+) -> list[str]:
     """Write points or splats with results to a file of a kind in `outputs`.
 
     Of a kind beside those of core they are put into the open file, which is saved at the end.
@@ -254,13 +270,14 @@ def write(path, given, results, arrays=None, numbers=None) -> list:
     """
     if kind_of(path) is not None:
         return given.owner.write(given, results, numbers or {})
-    splats = isinstance(given, core.splats.Splats)
     if path.suffix.lower() == ".npz":
-        points = np.asarray(given.positions if splats else given.points, dtype=np.float64)
-        named = {name.removeprefix(quantities.PREFIX): values for name, values in (results | (numbers or {})).items()}
+        points = np.asarray(positions(given), dtype=np.float64)
+        named = {
+            name.removeprefix(quantities.PREFIX): values for name, values in {**results, **(numbers or {})}.items()
+        }
         core.files.write_arrays(path, {"points": points, **named} if arrays is None else arrays)
         return []
-    if splats:
+    if isinstance(given, core.splats.Splats):
         if path.suffix.lower() != ".ply":
             raise core.PointCloudError(f"Splats cannot be written to {path}. Let its name end in .ply.")
         core.splats.write_splats(path, with_columns(given, {name: _narrow(values) for name, values in results.items()}))
@@ -268,7 +285,7 @@ def write(path, given, results, arrays=None, numbers=None) -> list:
     return core.files.write_points(path, with_results(given, results), double=not given.single)
 
 
-def with_results(given, results):
+def with_results(given: core.files.PointTable, results: Mapping[str, Array]) -> core.files.PointTable:
     """Return a table with results as further columns, in single precision; normals under the name that files have.
 
     Parameters
@@ -284,12 +301,12 @@ def with_results(given, results):
     return replace(given, attributes=attributes)
 
 
-def _narrow(values):
+def _narrow(values: Array) -> Array:
     """Return numbers in single precision, which is what results in files have in Blender, too."""
     return values.astype(np.float32) if values.dtype.kind == "f" else values
 
 
-def _some(splats, kept):
+def _some(splats: core.splats.Splats, kept: Array) -> core.splats.Splats:
     """Return some of the splats, (n,) bool."""
     names = ("positions", "scales", "rotations", "opacities", "colors", "harmonics")
     file = splats.file
@@ -298,7 +315,7 @@ def _some(splats, kept):
     return replace(splats, **{name: getattr(splats, name)[kept] for name in names}, file=file)
 
 
-def with_columns(splats, results):
+def with_columns(splats: core.splats.Splats, results: Mapping[str, Array]) -> core.splats.Splats:
     """Return splats to be written with results of their points as further columns of the file."""
     file = splats.file or core.splats.SplatFile({})
     columns = dict(file.columns)

@@ -1,19 +1,49 @@
 """Which files a command line reads and writes."""
 
+from __future__ import annotations
+
 import argparse
 import re
 import sys
 import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
 
 from . import core
 from .clouds import hint
 from .stages import tell_aside
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
 _READ = (*core.files.READABLE, *core.files.SPLATS)
 
 
-def add_files(parser, verb):
+class FileVerb(Protocol):
+    """What a verb tells of its files, as `verb.Verb` has it."""
+
+    @property
+    def inputs(self) -> str:
+        """What is read."""
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Endings of its output files."""
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """Options with other input files."""
+
+    def expand(self, path: Path, arguments: argparse.Namespace) -> list[Path]: ...
+
+    def beside(self, output: Path, arguments: argparse.Namespace) -> list[Path]: ...
+
+    def written_once(self, arguments: argparse.Namespace) -> list[Path]: ...
+
+    def owns(self, path: Path, arguments: argparse.Namespace) -> bool: ...
+
+
+def add_files(parser: argparse.ArgumentParser, verb: FileVerb) -> None:
     """Add the options for the inputs and outputs of a verb."""
     parser.add_argument(
         "inputs", nargs="*", type=Path, metavar="IN", help=f"{verb.inputs}; or folders of such, in the order of numbers"
@@ -37,7 +67,7 @@ def add_files(parser, verb):
         parser.add_argument("--format", choices=endings, default=endings[0], help="outputs in the folder")
 
 
-def add_choices(parser):
+def add_choices(parser: argparse.ArgumentParser) -> None:
     """Add the options for what is read of files."""
     add_las_choices(parser)
     parser.add_argument(
@@ -48,7 +78,7 @@ def add_choices(parser):
     )
 
 
-def add_las_choices(parser):
+def add_las_choices(parser: argparse.ArgumentParser) -> None:
     """Add the options for what is read of LAS files."""
     parser.add_argument(
         "--classes", default="", metavar="NUMBERS", help='classes of LAS files to read, such as "2 5"; else all'
@@ -59,12 +89,12 @@ def add_las_choices(parser):
     )
 
 
-def las_choices(arguments):
+def las_choices(arguments: argparse.Namespace) -> core.files.LasChoices:
     """Return which points of LAS files these options ask for, and in which unit."""
     return core.files.LasChoices(core.files.parse_classes(arguments.classes), arguments.withheld, arguments.meters)
 
 
-def parse_share(text):
+def parse_share(text: str) -> tuple[int, int]:
     """Parse K/N, the K-th of N equal shares, for an option."""
     match = re.fullmatch(r"(\d+)/(\d+)", text, re.ASCII)
     number, count = map(int, match.groups()) if match else (0, 0)
@@ -73,7 +103,7 @@ def parse_share(text):
     return number, count
 
 
-def find_inputs(parser, verb, arguments):
+def find_inputs(parser: argparse.ArgumentParser, verb: FileVerb, arguments: argparse.Namespace) -> None:
     """Set the inputs to the files of this share, and refuse those that cannot be processed, by `parser.error`.
 
     What folders have besides is told by the notices `left_out`, and `total` is the number of files of all shares.
@@ -101,7 +131,7 @@ def find_inputs(parser, verb, arguments):
     arguments.inputs, arguments.total = files[number - 1 :: count], len(files)
 
 
-def _others(folder, taken, verb, arguments) -> list:
+def _others(folder: Path, taken: list[Path], verb: FileVerb, arguments: argparse.Namespace) -> list[str]:
     """Return notices of the files in a folder that are no inputs, and print them."""
     names = {path.name for path in taken}
     paths = (path for path in folder.iterdir() if path.name not in names and path.name[0] != ".")
@@ -114,7 +144,7 @@ def _others(folder, taken, verb, arguments) -> list:
     return [notice]
 
 
-def check_outputs(verb, arguments):
+def check_outputs(verb: FileVerb, arguments: argparse.Namespace) -> None:
     """Refuse to begin where an output cannot be written, or a package for it is missing.
 
     Raises
@@ -134,13 +164,13 @@ def check_outputs(verb, arguments):
             tempfile.TemporaryFile(dir=next(home for home in (folder, *folder.parents) if home.exists())).close()
 
 
-def check_beside(parser, arguments, option):
+def check_beside(parser: argparse.ArgumentParser, arguments: argparse.Namespace, option: str) -> None:
     """Refuse an option for a further file beside the output, if there is none, by `parser.error`."""
     if getattr(arguments, option) and arguments.out is None and arguments.out_dir is None:
         parser.error(f"--{option} writes a file beside the output: give --out or --out-dir, too")
 
 
-def _listed(source):
+def _listed(source: str | None) -> list[Path]:
     """Return the paths in a list; none without one."""
     if source is None:
         return []
@@ -151,7 +181,7 @@ def _listed(source):
     return [Path(line.strip()) for line in text.splitlines() if line.strip()]
 
 
-def files_in(folder, endings=_READ):
+def files_in(folder: Path, endings: Sequence[str] = _READ) -> list[Path]:
     """Return all files with points in a folder, of these endings, ordered by numbers."""
     try:
         paths = [path for path in folder.iterdir() if path.suffix.lower() in endings and path.is_file()]
@@ -167,26 +197,26 @@ def files_in(folder, endings=_READ):
 _SHOWN = 5  # names of what is left out
 
 
-def _natural(name):
+def _natural(name: str) -> list[str | int]:
     """Return a key by which names are in the order of the numbers in them."""
     parts = re.split(r"(\d+)", name.lower(), flags=re.ASCII)
     return [int(part) if index % 2 else part for index, part in enumerate(parts)]
 
 
-def output_path(path, arguments):
+def output_path(path: Path, arguments: argparse.Namespace) -> Path | None:
     """Return the path of the main output of an input, or None."""
     if arguments.out_dir is not None:
         return arguments.out_dir / f"{path.stem}.{arguments.format}"
     return arguments.out
 
 
-def outputs_of(verb, path, arguments) -> list:
+def outputs_of(verb: FileVerb, path: Path, arguments: argparse.Namespace) -> list[Path]:
     """Return the paths of all files that are written for an input."""
     output = output_path(path, arguments)
     return [] if output is None else [output, *verb.beside(output, arguments)]
 
 
-def read_files(verb, path, arguments) -> list:
+def read_files(verb: FileVerb, path: Path, arguments: argparse.Namespace) -> list[Path]:
     """Return the paths of all files that are read for an input."""
     others = (getattr(arguments, name) for name in verb.reads)
     return [path, *map(Path, filter(None, others))]

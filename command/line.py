@@ -1,5 +1,7 @@
 """The command line: from files to files, by verbs."""
 
+from __future__ import annotations
+
 import argparse
 import contextlib
 import errno
@@ -10,6 +12,7 @@ import traceback
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from time import perf_counter
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from . import core
 from .inputs import add_files, check_outputs, find_inputs, output_path, outputs_of, read_files
@@ -18,13 +21,18 @@ from .stages import silence, tell_aside
 from .verb import DONE, ELSEWHERE, FAILED, WRONG_USAGE
 from .verbs import Frames
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from .verb import Verb
+
 _SCARCE = {errno.ENOMEM, errno.ENOSPC, errno.EDQUOT, errno.EFBIG}  # of errors that another machine may not have
 _NOT_WRITTEN = "No file is written: neither --out nor --out-dir is given."
 _PACKAGE = "meshfree-laplacian"
 _EXPECTED = (core.PointCloudError, OSError, RuntimeError, MemoryError)  # Blender raises RuntimeError
 
 
-def run(argv, verbs, program) -> int:
+def run(argv: list[str], verbs: Sequence[Verb], program: str) -> int:
     """Run the command line.
 
     Parameters
@@ -45,7 +53,7 @@ def run(argv, verbs, program) -> int:
     try:
         verb, arguments = _parse(argv, verbs, program)
     except SystemExit as stop:  # from argparse after --help and wrong usage
-        return stop.code or DONE
+        return int(stop.code or DONE)
     with contextlib.ExitStack() as stack:
         try:
             check_outputs(verb, arguments)
@@ -65,7 +73,7 @@ def run(argv, verbs, program) -> int:
         return code
 
 
-def _others_at_work(arguments, stack) -> list:
+def _others_at_work(arguments: argparse.Namespace, stack: contextlib.ExitStack) -> list[str]:
     """Hold the share of the folder for outputs, if there is one, on a stack; return notices if another run does."""
     if arguments.out_dir is None:
         return []
@@ -76,12 +84,12 @@ def _others_at_work(arguments, stack) -> list:
     return [] if alone else [f"Another run is at work on the same share of {arguments.out_dir}."]
 
 
-def _delete_empty(folder):
+def _delete_empty(folder: Path) -> None:
     with contextlib.suppress(OSError):
         folder.rmdir()
 
 
-def _do(verb, path, arguments, records, notices) -> int:
+def _do(verb: Verb, path: Path, arguments: argparse.Namespace, records: Records, notices: list[str]) -> int:
     """Process an input, tell and record how that went, and return the exit code for it."""
     if records.holds(path):
         return _tell({"file": str(path), "skipped": True, **({"notices": notices} if notices else {})})
@@ -107,7 +115,7 @@ def _do(verb, path, arguments, records, notices) -> int:
     return code
 
 
-def _tell(line) -> int:
+def _tell(line: dict[str, Any]) -> int:
     """Print a line of JSON, and return the exit code for that: the disk that it goes to may be full."""
     try:
         print(json.dumps(line), flush=True)
@@ -120,13 +128,13 @@ def _tell(line) -> int:
     return DONE
 
 
-def _text(error):
+def _text(error: Exception) -> str:
     """Return the text of an error, without the prefix of those that Blender reports; and its kind, if it has a bug."""
     text = str(error).strip().removeprefix("Error: ")
     return text if isinstance(error, _EXPECTED) and text else f"{type(error).__name__}: {text}".removesuffix(": ")
 
 
-def _is_scarcity(error) -> bool:
+def _is_scarcity(error: BaseException | None) -> bool:
     """Whether an error, or its cause, is a want of memory or disk."""
     while error is not None:
         if isinstance(error, (core.NotEnoughMemoryError, MemoryError)) or getattr(error, "errno", None) in _SCARCE:
@@ -138,12 +146,12 @@ def _is_scarcity(error) -> bool:
 class _Parser(argparse.ArgumentParser):
     """A parser that tells of wrong usage in one line."""
 
-    def error(self, message):
+    def error(self, message: str) -> NoReturn:
         text = " ".join(message.split())
         self.exit(WRONG_USAGE, f"{self.prog}: {text}{'' if text.endswith('.') else '.'} See {self.prog} --help.\n")
 
 
-def _parse(argv, verbs, program):
+def _parse(argv: list[str], verbs: Sequence[Verb], program: str) -> tuple[Verb, argparse.Namespace]:
     """Return the requested verb and its arguments."""
     parser = _Parser(prog=program)
     parser.add_argument("--version", action="version", version=f"meshfree {_version()}")
@@ -171,14 +179,15 @@ def _version() -> str:
     """Return the version of the extension, or of the wheel that this is installed from."""
     manifest = Path(__file__).parents[1] / "blender_manifest.toml"
     if manifest.exists():
-        return re.search(r'^version = "(.+)"', manifest.read_text(encoding="utf-8"), re.MULTILINE)[1]
+        [found] = re.findall(r'^version = "(.+)"', manifest.read_text(encoding="utf-8"), re.MULTILINE)
+        return str(found)
     try:
         return version(_PACKAGE)
     except PackageNotFoundError:
         return "of unknown number"
 
 
-def _process(verb, path, arguments) -> dict:
+def _process(verb: Verb, path: Path, arguments: argparse.Namespace) -> dict[str, Any]:
     """Process one file, write its output, and return what to print."""
     output, written = output_path(path, arguments), outputs_of(verb, path, arguments)
     for read in read_files(verb, path, arguments):

@@ -1,12 +1,21 @@
 """What volumes of parts are measured over: planes and other clouds, for the command line and for Blender's tools."""
 
+from __future__ import annotations
+
 from math import nan
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from . import core, tools
 from .settings import place
+
+if TYPE_CHECKING:
+    from argparse import ArgumentParser, Namespace
+    from collections.abc import Callable, Sequence
+
+    from tools.measure_parts import PartRow
+    from tools.tool import Array, Progress
 
 _VOLUMES = "above", "below", "difference", "difference_uncertainty"  # over a plane or a cloud
 _TOLD = 5  # notices of volumes over a plane that are told
@@ -26,14 +35,16 @@ class Base(NamedTuple):
         Of the other cloud.
     """
 
-    point: np.ndarray
-    normal: np.ndarray
-    ground: object = None
-    shift: np.ndarray = np.zeros(3)
+    point: Array
+    normal: Array
+    ground: Callable[[Progress], core.LaplaceBeltrami] | None = None
+    shift: Array = np.zeros(3)
     name: str = ""
 
 
-def pile_over(laplacian, chosen, base, progress):
+def pile_over(
+    laplacian: core.LaplaceBeltrami, chosen: Array, base: Base | None, progress: Progress
+) -> core.measure.Pile:
     """Measure the volume between a part, (n,) bool, and a `Base`, None for the plane through its rim."""
     if base is None:
         return core.measure.pile_volume(laplacian, chosen)
@@ -47,7 +58,14 @@ def pile_over(laplacian, chosen, base, progress):
     return core.measure.pile_volume(laplacian, chosen, plane=(base.point, base.normal), heights=heights)
 
 
-def base_of(plane, normal, place, ground=None, ground_place=None, name=""):
+def base_of(
+    plane: Array | None,
+    normal: Array | None,
+    place: Array,
+    ground: Callable[[Progress], core.LaplaceBeltrami] | None = None,
+    ground_place: Array | None = None,
+    name: str = "",
+) -> Base | None:
     """Return the `Base` that options give, None for none.
 
     Parameters
@@ -70,12 +88,12 @@ def base_of(plane, normal, place, ground=None, ground_place=None, name=""):
     return Base(point, tools.cross_section.UP if normal is None else normal, ground, shift, name)
 
 
-def add_normal(parser, more=""):
+def add_normal(parser: ArgumentParser, more: str = "") -> None:
     """Add the option for the normal of a plane, with `more` on it."""
     parser.add_argument("--normal", type=place, metavar="X,Y,Z", help=f"vector across the plane{more}; else upwards")
 
 
-def add_base(parser):
+def add_base(parser: ArgumentParser) -> None:
     """Add the options for the plane over which volumes are measured; that for another cloud is `--reference`."""
     parser.add_argument(
         "--plane",
@@ -86,13 +104,19 @@ def add_base(parser):
     add_normal(parser, ", to what counts as above, along which heights over --reference are")
 
 
-def check_base(parser, arguments):
+def check_base(parser: ArgumentParser, arguments: Namespace) -> None:
     """Refuse a normal without what volumes are measured over."""
     if arguments.normal is not None and arguments.plane is None and not arguments.reference:
         parser.error("--normal goes with --plane or --reference")
 
 
-def volumes_over(laplacian, rows, labels, base, progress):
+def volumes_over(
+    laplacian: core.LaplaceBeltrami,
+    rows: Sequence[PartRow],
+    labels: Array | None,
+    base: Base | None,
+    progress: Progress,
+) -> tuple[list[dict[str, Any]], list[str]]:
     """Measure the volumes of parts over a `Base`.
 
     Returns
@@ -107,7 +131,7 @@ def volumes_over(laplacian, rows, labels, base, progress):
     volumes, notices, failed = [], [], []
     for row in rows:
         kind, label = row.name.split()
-        part = (laplacian.component if kind == "Component" else labels) == int(label)
+        part: Any = (laplacian.component if kind == "Component" else labels) == int(label)
         try:
             found = pile_over(laplacian, part, base, progress)
         except core.InvalidPointsError as error:  # no part of the other cloud is above or below it

@@ -1,28 +1,45 @@
 """The subcommand that makes a mesh of a cloud."""
 
+from __future__ import annotations
+
 import argparse
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import clouds, colors, core
 from .tool_verb import ToolVerb
 
+if TYPE_CHECKING:
+    from argparse import ArgumentParser, Namespace
+    from pathlib import Path
+
+    from tools.tool import Array, Outcome, Progress
+
 
 class MeshVerb(ToolVerb):
     """The subcommand of the tool that makes a mesh, whose outputs are files of meshes."""
 
     @property
-    def outputs(self):
+    def outputs(self) -> tuple[str, ...]:  # type: ignore[override]  # computed
         """Endings of files."""
         return (*clouds.kinds(), *core.files.MESHES)
 
-    def add_options(self, parser):
+    def add_options(self, parser: ArgumentParser) -> None:
         super().add_options(parser)
         if clouds.kinds():
             told = "end the mesh where the points end; otherwise all openings are closed (default on)"
             parser.add_argument("--keep-open", action=argparse.BooleanOptionalAction, default=True, help=told)
 
-    def compute(self, cloud, laplacian, inputs, own, arguments, progress):
+    def compute(
+        self,
+        cloud: clouds.Cloud,
+        laplacian: core.LaplaceBeltrami,
+        inputs: Any,
+        own: Any,
+        arguments: Namespace,
+        progress: Progress,
+    ) -> Any:
         found = super().compute(cloud, laplacian, inputs, own, arguments, progress)
         for kind in clouds.kinds().values() if found.opened else ():
             if not arguments.keep_open:
@@ -30,7 +47,9 @@ class MeshVerb(ToolVerb):
                 found = found._replace(faces=faces, opened=opened)
         return found
 
-    def write(self, output, cloud, outcome, laplacian, arguments):
+    def write(
+        self, output: Path, cloud: clouds.Cloud, outcome: Outcome, laplacian: core.LaplaceBeltrami, arguments: Namespace
+    ) -> list[str]:
         faces, table = outcome.made.faces, _on_vertices(cloud, laplacian, outcome.made.mesh.vertices)
         if clouds.kind_of(output) is None:
             return core.files.write_mesh(output, table, faces, double=not table.single)
@@ -38,13 +57,13 @@ class MeshVerb(ToolVerb):
         return []
 
 
-def _on_vertices(cloud, laplacian, vertices):
+def _on_vertices(cloud: clouds.Cloud, laplacian: core.LaplaceBeltrami, vertices: Array) -> core.files.PointTable:
     """Return vertices in the coordinates of the file, with the columns and colors of the points."""
     if cloud.splats is not None:
-        tint = colors.of_splats(cloud.splats.colors)
+        tint: Array | None = colors.of_splats(cloud.splats.colors)
     else:
         tint = None if cloud.given.colors is None else colors.linear(cloud.given.colors)
-    single = cloud.splats is not None or cloud.given.single
+    single = isinstance(cloud.given, core.splats.Splats) or cloud.given.single
     table = core.files.PointTable(vertices + cloud.place, single=single)
     columns = {**cloud.columns, **{name: np.nan_to_num(weights) for name, weights in cloud.groups.items()}}
     if columns or tint is not None:

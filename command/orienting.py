@@ -1,11 +1,22 @@
 """The side of normals, which positions in the coordinates of a file may tell."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 from . import analysis, clouds, core, quantities
 from .settings import place
 from .tool_verb import ToolVerb
 
+if TYPE_CHECKING:
+    from argparse import ArgumentParser, Namespace
+    from collections.abc import Callable
+    from pathlib import Path
 
-def add_viewpoint(parser, implied, convert=place):
+    from tools.tool import Outcome
+
+
+def add_viewpoint(parser: ArgumentParser, implied: str, convert: Callable[[str], Any] = place) -> None:
     """Add the option for a viewpoint, from a text; `implied` is what it sets, for the help."""
     parser.add_argument(
         "--viewpoint",
@@ -19,11 +30,11 @@ def add_viewpoint(parser, implied, convert=place):
 class OrientVerb(ToolVerb):
     """The verb `orient`, which writes the analysis with the side."""
 
-    def add_options(self, parser):
+    def add_options(self, parser: ArgumentParser) -> None:
         add_viewpoint(parser, "the method VIEWPOINT", clouds.place_or_object)
         super().add_options(parser)
 
-    def check(self, parser, arguments):
+    def check(self, parser: ArgumentParser, arguments: Namespace) -> None:
         """Set the method that a viewpoint or a column implies, and refuse others."""
         given = {"VIEWPOINT": ("--viewpoint", arguments.viewpoint), "ATTRIBUTE": ("--source", arguments.source)}
         for method, (option, value) in given.items():
@@ -35,7 +46,9 @@ class OrientVerb(ToolVerb):
             if not missing:
                 arguments.method = method
 
-    def write(self, output, cloud, outcome, subject, arguments):
+    def write(
+        self, output: Path, cloud: clouds.Cloud, outcome: Outcome, subject: Any, arguments: Namespace
+    ) -> list[str]:
         turned = subject.toward(outcome.values[quantities.ORIENTATION])
         values = analysis.Built(turned, core.measure.measure_mean_curvature(turned)).measures
         values[quantities.ORIENTATION] = values[quantities.NORMAL]

@@ -1,15 +1,24 @@
 """Records of what was done to each file: reports of lines of JSON, and what need not be done again."""
 
+from __future__ import annotations
+
 import json
 import os
 import stat
 import time
 from collections import defaultdict
 from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
 from .inputs import outputs_of, read_files
+
+if TYPE_CHECKING:
+    from argparse import ArgumentParser, Namespace
+    from collections.abc import Iterator, Sequence
+
+    from .verb import Verb
 
 SUFFIX = ".jsonl"
 _NEEDED = {"path", "verb", "settings", "stamps", "elapsed", "ended"}  # in a record
@@ -22,7 +31,7 @@ _NOT_SETTINGS = (
 _UNREACHED = "It was to be processed, and was not reached: the program was stopped before, or is still at work."
 
 
-def add_report(parser):
+def add_report(parser: ArgumentParser) -> None:
     """Add the options for reports."""
     parser.add_argument(
         "--report",
@@ -39,7 +48,7 @@ def add_report(parser):
     )
 
 
-def check_report(parser, arguments):
+def check_report(parser: ArgumentParser, arguments: Namespace) -> None:
     """Refuse options that miss each other, by `parser.error`."""
     if arguments.report is not None and arguments.report.suffix != SUFFIX:
         parser.error(f"--report must end in {SUFFIX}")
@@ -56,7 +65,7 @@ class Records:
     arguments : argparse.Namespace
     """
 
-    def __init__(self, verb, arguments):
+    def __init__(self, verb: Verb, arguments: Namespace) -> None:
         self._verb, self._arguments = verb, arguments
         given = {name: value for name, value in vars(arguments).items() if name not in _NOT_SETTINGS}
         self._settings = json.loads(json.dumps(given, default=_plain))
@@ -66,11 +75,11 @@ class Records:
                 if "error" not in record and (record["verb"], record.get("settings")) == (verb.name, self._settings):
                     self._done[record["path"]].append(record["stamps"])
 
-    def holds(self, path) -> bool:
+    def holds(self, path: Path) -> bool:
         """Whether an input is done, with the same settings, and nothing has changed since."""
         return {**self.read_stamps(path), **self._written_stamps(path)} in self._done[_name(path)]
 
-    def plan(self):
+    def plan(self) -> None:
         """Tell beside the report, if there is one, which inputs are to be processed, so that none is lost unseen."""
         arguments = self._arguments
         if arguments.report is None:
@@ -87,7 +96,7 @@ class Records:
         }
         _append(arguments.report.with_suffix(_PLANS), plan)
 
-    def keep(self, path, line, seconds, read):
+    def keep(self, path: Path, line: dict[str, Any], seconds: float, read: dict[str, list[int] | None]) -> None:
         """Append the record of an input to the report, if there is one.
 
         Parameters
@@ -112,19 +121,19 @@ class Records:
         }
         _append(self._arguments.report, record)
 
-    def read_stamps(self, path) -> dict:
+    def read_stamps(self, path: Path) -> dict[str, list[int] | None]:
         """Return size and time of all files that are read for an input, by their paths; None for what is no file."""
         return {_name(file): stamp(file) for file in read_files(self._verb, path, self._arguments)}
 
-    def _written_stamps(self, path):
+    def _written_stamps(self, path: Path) -> dict[str, list[int] | None]:
         return {_name(file): stamp(file) for file in outputs_of(self._verb, path, self._arguments)}
 
 
-def _name(path):
+def _name(path: str | Path) -> str:
     return str(Path(path).resolve())
 
 
-def stamp(path):
+def stamp(path: Path) -> list[int] | None:
     """Return size and time of a file, in nanoseconds; None for what is no file."""
     try:
         known = os.stat(path)
@@ -135,12 +144,12 @@ def stamp(path):
     return [known.st_size, known.st_mtime_ns]
 
 
-def _plain(value):
+def _plain(value: Any) -> Any:
     """Return settings that are paths or arrays as JSON knows them."""
     return value.tolist() if isinstance(value, np.ndarray) else str(value)
 
 
-def _append(path, record):
+def _append(path: Path, record: dict[str, Any]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with open(path, "a+b") as file:
         if file.tell() and not _ends_line(file):  # a writer was killed in its last line
@@ -148,12 +157,12 @@ def _append(path, record):
         file.write(json.dumps(record).encode() + b"\n")  # at once: a killed writer leaves whole lines before it
 
 
-def _ends_line(file):
+def _ends_line(file: IO[bytes]) -> bool:
     file.seek(-1, os.SEEK_END)
     return file.read(1) == b"\n"
 
 
-def read_reports(folder):
+def read_reports(folder: Path) -> tuple[list[dict[str, Any]], int]:
     """Read all records in the reports of a folder.
 
     Parameters
@@ -172,13 +181,13 @@ def read_reports(folder):
     return sorted(found, key=lambda record: record["ended"]), len(lines) - len(found)
 
 
-def read_plans(folder) -> list:
+def read_plans(folder: Path) -> list[dict[str, Any]]:
     """Read which inputs were to be processed, beside the reports of a folder, in the order in which that began."""
     found = [line for line in _lines(folder, _PLANS) if line.keys() >= _PLANNED]
     return sorted(found, key=lambda plan: plan["began"])
 
 
-def _lines(folder, ending):
+def _lines(folder: Path, ending: str) -> Iterator[dict[str, Any]]:
     """Yield the lines of all files of a folder as dictionaries, empty where they hold something else."""
     for report in sorted(folder.glob(f"*{ending}")):
         for line in report.read_text(encoding="utf-8", errors="replace").splitlines():
@@ -189,7 +198,7 @@ def _lines(folder, ending):
             yield record if isinstance(record, dict) else {}
 
 
-def last_records(records, plans=()) -> list:
+def last_records(records: Sequence[dict[str, Any]], plans: Sequence[dict[str, Any]] = ()) -> list[dict[str, Any]]:
     """Return the last record of each verb on each file by their paths, or that it was planned and not reached.
 
     Parameters
@@ -208,7 +217,7 @@ def last_records(records, plans=()) -> list:
     return [last[key] for key in sorted(last)]
 
 
-def shares_not_begun(plans) -> dict:
+def shares_not_begun(plans: Sequence[dict[str, Any]]) -> dict[str, int]:
     """Return the numbers of files in the shares without a plan, beside those of the last plan of each verb."""
     last = {plan["verb"]: plan for plan in plans}
     found = {}

@@ -1,12 +1,15 @@
 """Verbs that hold clouds against that of another file."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import clouds, colors, quantities, transferring
+from . import clouds, colors, core, quantities, transferring
 from .cloud_verb import CloudVerb, SurfaceVerb, boundary_of, floaters
 from .measures import add_base, base_of, check_base, volumes_over
 from .naming import naming
@@ -15,16 +18,25 @@ from .rows import TABLES, write_rows
 from .settings import chosen
 from .tool_verb import PointVerb, ToolVerb
 
+if TYPE_CHECKING:
+    from argparse import ArgumentParser, Namespace
+
+    from tools.tool import Array, Outcome, Progress
+
+    from . import core
+
 
 class WithReference(CloudVerb):
     """A verb with another file, which is read once, before the first input."""
 
     reads = ("reference",)
+    tool: Any  # of a subclass
     use = ""  # what the reference is for, for the help, if no tool tells it
     required = True  # whether there must be one
-    _own = _target = None  # arguments with the settings of the reference, and its cloud
+    _own: Any = None  # arguments with the settings of the reference
+    _target: Any = None  # its cloud, or what a verb of Blender has for it
 
-    def add_options(self, parser):
+    def add_options(self, parser: ArgumentParser) -> None:
         use = self.use or self.tool.reference
         parser.add_argument(
             "--reference", required=self.required, metavar="FILE", help=f"{use}, of the kinds of inputs"
@@ -35,7 +47,7 @@ class WithReference(CloudVerb):
             )
         super().add_options(parser)
 
-    def run(self, path, arguments, output):
+    def run(self, path: Path, arguments: Namespace, output: Path | None) -> dict[str, Any]:
         if self._target is None and arguments.reference is not None:
             reference = Path(arguments.reference)
             given = self.read(reference, arguments, "reference_object")  # whose errors have its name already
@@ -44,20 +56,22 @@ class WithReference(CloudVerb):
                 self._target = self.target(reference, given)
         return super().run(path, arguments, output)
 
-    def target(self, path, given):
+    def target(self, path: Path, given: clouds.Given) -> clouds.Cloud:
         """Return the cloud of the reference, with all that is read of it."""
         return clouds.Cloud(path, given)
 
     @property
-    def read_notices(self):
+    def read_notices(self) -> list[str]:  # type: ignore[override]  # computed
         """What was told as the reference was read, if there is one."""
         return [] if self._target is None else self._target.notices
 
-    def reference(self):
+    def reference(self) -> tuple[clouds.Cloud, Namespace]:
         """Return the cloud of the reference, and arguments with its settings."""
         return self._target, self._own
 
-    def write(self, output, cloud, outcome, subject, arguments):
+    def write(
+        self, output: Path, cloud: clouds.Cloud, outcome: Outcome, subject: Any, arguments: Namespace
+    ) -> list[str]:
         given, target = cloud.given, self._target
         if outcome.matrix is not None:
             shifted = cloud.points + (cloud.place - target.place)
@@ -70,12 +84,12 @@ class ReferenceVerb(WithReference, SurfaceVerb):
 
     _laplacian = None
 
-    def target(self, path, given):
+    def target(self, path: Path, given: clouds.Given) -> clouds.Cloud:
         cloud = clouds.Cloud(path, given, floaters(self._own))
         boundary_of(cloud, vars(self._own))
         return cloud
 
-    def laplacian(self, cloud, arguments, progress):
+    def laplacian(self, cloud: clouds.Cloud, arguments: Namespace, progress: Progress) -> core.LaplaceBeltrami:
         if cloud is not self._target:
             return super().laplacian(cloud, arguments, progress)
         if self._laplacian is None:
@@ -97,15 +111,23 @@ class MeasureVerb(ReferenceVerb, ToolVerb):
 
     outputs, prints_all, required = TABLES, True, False
 
-    def add_options(self, parser):
+    def add_options(self, parser: ArgumentParser) -> None:
         add_base(parser)
         super().add_options(parser)
 
-    def check(self, parser, arguments):
+    def check(self, parser: ArgumentParser, arguments: Namespace) -> None:
         check_base(parser, arguments)
 
-    def compute(self, cloud, laplacian, inputs, own, arguments, progress):
-        found, ground = super().compute(cloud, laplacian, inputs, own, arguments, progress), ()
+    def compute(
+        self,
+        cloud: clouds.Cloud,
+        laplacian: core.LaplaceBeltrami,
+        inputs: Any,
+        own: Any,
+        arguments: Namespace,
+        progress: Progress,
+    ) -> Any:
+        found, ground = super().compute(cloud, laplacian, inputs, own, arguments, progress), tuple[Any, ...]()
         if self._target is not None:
             operator = self.laplacian(*self.reference(), progress)
             ground = (lambda _: operator), self._target.place, self._target.path.name
@@ -113,7 +135,9 @@ class MeasureVerb(ReferenceVerb, ToolVerb):
         beside, told = volumes_over(laplacian, found.rows, inputs[0], base, progress)
         return found._replace(beside=beside, notices=[*found.notices, *told])
 
-    def write(self, output, cloud, outcome, laplacian, arguments):
+    def write(
+        self, output: Path, cloud: clouds.Cloud, outcome: Outcome, laplacian: core.LaplaceBeltrami, arguments: Namespace
+    ) -> list[str]:
         write_rows(output, outcome.figures["parts"])
         return []
 
@@ -126,8 +150,10 @@ class TransferAttributes(ReferenceVerb):
     settings = (*transferring.MATCH.values(), *transferring.ATTRIBUTES.values())
     use = "points whose attributes are taken"
 
-    def work(self, path, given, arguments, output, progress):
-        target, laplacian = self._target, self.laplacian(*self.reference(), progress)
+    def work(
+        self, path: Path, given: clouds.Given, arguments: Namespace, output: Path | None, progress: Progress
+    ) -> tuple[dict[str, Any], list[str]]:
+        target, laplacian = self.reference()[0], self.laplacian(*self.reference(), progress)
         own, reference = SimpleNamespace(**chosen(self.settings, arguments)), arguments.reference
         arrays, left_out = _values(target, own)
         cloud = clouds.Cloud(path, given, floaters(arguments))
@@ -143,7 +169,7 @@ class TransferAttributes(ReferenceVerb):
         return {"points": len(cloud.points), "done": line, **match.figures}, [*built.notices, *told]
 
 
-def _values(cloud, own):
+def _values(cloud: clouds.Cloud, own: Any) -> tuple[dict[str, Array], list[str]]:
     """Return the columns of a cloud that settings ask for, by name, colors as linear ones; and which are left out."""
     columns, tint = dict(cloud.columns), cloud.given.colors if cloud.splats is None else None
     if tint is not None:
@@ -154,19 +180,19 @@ def _values(cloud, own):
     return found, sorted(wanted.keys() - found.keys())
 
 
-def _is_smooth(name, column):
+def _is_smooth(name: str, column: Array) -> bool:
     """Whether numbers are averaged: those that are no labels."""
     return column.dtype.kind == "f" and quantities.quantity(name).carried != "label"
 
 
-def _write_taken(output, cloud, new, state):
+def _write_taken(output: Path, cloud: clouds.Cloud, new: dict[str, Array], state: Array) -> list[str]:
     """Write a cloud with what it has taken, by name; return notices."""
-    given, tint, state = cloud.given, new.pop(colors.COLOR, None), {quantities.TRANSFER: state}
+    given, tint, where = cloud.given, new.pop(colors.COLOR, None), {quantities.TRANSFER: state}
     if output.suffix.lower() == ".npz":
-        return clouds.write(output, given, {**new, **state} | ({} if tint is None else {"colors": colors.srgb(tint)}))
-    if cloud.splats is not None:
+        return clouds.write(output, given, {**new, **where} | ({} if tint is None else {"colors": colors.srgb(tint)}))
+    if isinstance(given, core.splats.Splats):
         kept = [] if tint is None else ["Splats have colors of their own, so that none are taken."]
-        return [*clouds.write(output, given, {**new, **state}), *kept]
+        return [*clouds.write(output, given, {**new, **where}), *kept]
     if tint is not None:
         given = replace(given, colors=np.clip(colors.srgb(tint), 0.0, 1.0).astype(np.float32))
-    return clouds.write(output, replace(given, attributes={**given.attributes, **new}), state)
+    return clouds.write(output, replace(given, attributes={**given.attributes, **new}), where)

@@ -1,9 +1,17 @@
 """The verb that merges reports to one table."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 from . import core
 from .records import SUFFIX, last_records, read_plans, read_reports, shares_not_begun
 from .rows import TABLES, write_rows
 from .verb import Verb
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+    from pathlib import Path
 
 _COLUMNS = ("path", "verb", "points", "total_area", "elapsed", "output", "notices", "error")
 
@@ -22,10 +30,10 @@ class Report(Verb):
     outputs = TABLES
     prints_all = True
 
-    def expand(self, path, arguments):
+    def expand(self, path: Path, arguments: Namespace) -> list[Path]:
         return [path]
 
-    def run(self, path, arguments, output):
+    def run(self, path: Path, arguments: Namespace, output: Path | None) -> dict[str, Any]:
         if not path.is_dir():
             raise core.PointCloudError(f"There is no folder {path}. Name the one with the reports.")
         found, broken = read_reports(path)
@@ -53,7 +61,7 @@ class Report(Verb):
         return {**totals, "errors": errors, "notices": [lost] if broken else []}
 
 
-def _row(record):
+def _row(record: dict[str, Any]) -> dict[str, Any]:
     """Return a record as a row of the table: areas also of parts, and notices as one text."""
     area = record.get("total_area")
     parts = [part["area"] for part in record.get("parts", []) if part["name"].startswith("Component")]
@@ -63,7 +71,7 @@ def _row(record):
     return row
 
 
-def _total_row(totals):
+def _total_row(totals: dict[str, Any]) -> dict[str, Any]:
     """Return the last row of the table, whose path counts the files."""
     return {
         "path": f"{totals['files']} files, {totals['failed']} failed",

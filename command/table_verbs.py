@@ -1,5 +1,9 @@
 """The subcommands of tools that cut and measure along lines, whose outputs are tables."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from . import clouds, core, tools
@@ -11,6 +15,13 @@ from .svg import profile_picture
 from .tool_verb import ToolVerb
 from .units import NO_UNITS
 
+if TYPE_CHECKING:
+    from argparse import ArgumentParser, Namespace
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from tools.tool import Array, Outcome
+
 _CURVES = "curve,closed,x,y,z", ["%d", "%d", "%.17g", "%.17g", "%.17g"]  # columns of a file of corners, and their form
 
 
@@ -18,11 +29,11 @@ class SectionVerb(ToolVerb):
     """The subcommand of the tool that cuts, whose outputs are tables of the curves."""
 
     @property
-    def outputs(self):
+    def outputs(self) -> tuple[str, ...]:  # type: ignore[override]  # computed
         """Endings of files."""
         return (*TABLES, *clouds.kinds())
 
-    def add_options(self, parser):
+    def add_options(self, parser: ArgumentParser) -> None:
         named = "; or the name of an object of the input, whose local XY plane cuts" if clouds.kinds() else ""
         parser.add_argument(
             "--plane",
@@ -37,15 +48,15 @@ class SectionVerb(ToolVerb):
         )
         super().add_options(parser)
 
-    def check(self, parser, arguments):
+    def check(self, parser: ArgumentParser, arguments: Namespace) -> None:
         if arguments.normal is not None and isinstance(arguments.plane, str):
             parser.error("--normal goes with a position, not with an object, whose plane has one")
         check_beside(parser, arguments, "curves")
 
-    def beside(self, output, arguments):
+    def beside(self, output: Path, arguments: Namespace) -> list[Path]:
         return [output.with_name(f"{output.stem}_curves.csv")] if arguments.curves else []
 
-    def inputs(self, cloud, arguments):
+    def inputs(self, cloud: clouds.Cloud, arguments: Namespace) -> tuple[Any, Any]:  # type: ignore[override]  # another thing
         (position, normal, told, name), own = super().inputs(cloud, arguments)
         normal = normal if arguments.normal is None else arguments.normal
         if isinstance(arguments.plane, str):
@@ -55,7 +66,9 @@ class SectionVerb(ToolVerb):
             position, told = arguments.plane - cloud.place, ()
         return (position, normal, told, name), own
 
-    def write(self, output, cloud, outcome, laplacian, arguments):
+    def write(
+        self, output: Path, cloud: clouds.Cloud, outcome: Outcome, laplacian: core.LaplaceBeltrami, arguments: Namespace
+    ) -> list[str]:
         curves = [(curve.points + cloud.place, curve.closed) for curve in outcome.made]
         if clouds.kind_of(output) is not None:
             cloud.owner.add_curves(curves)
@@ -66,7 +79,7 @@ class SectionVerb(ToolVerb):
         return []
 
 
-def _write_corners(path, curves):
+def _write_corners(path: Path, curves: Sequence[tuple[Array, bool]]) -> None:
     """Write the corners of curves."""
     columns = [
         np.column_stack([np.full((len(points), 2), (number, closed)), points])
@@ -80,11 +93,11 @@ class ProfileVerb(ToolVerb):
     """The subcommand of the tool that measures along a path, whose outputs are tables."""
 
     @property
-    def outputs(self):
+    def outputs(self) -> tuple[str, ...]:  # type: ignore[override]  # computed
         """Endings of files."""
         return (".csv", *clouds.kinds())
 
-    def add_options(self, parser):
+    def add_options(self, parser: ArgumentParser) -> None:
         for option, what in (("from", "begins"), ("to", "ends")):
             parser.add_argument(
                 f"--{option}",
@@ -100,13 +113,15 @@ class ProfileVerb(ToolVerb):
         )
         super().add_options(parser)
 
-    def check(self, parser, arguments):
+    def check(self, parser: ArgumentParser, arguments: Namespace) -> None:
         check_beside(parser, arguments, "svg")
 
-    def beside(self, output, arguments):
+    def beside(self, output: Path, arguments: Namespace) -> list[Path]:
         return [output.with_suffix(".svg")] if arguments.svg else []
 
-    def write(self, output, cloud, outcome, laplacian, arguments):
+    def write(
+        self, output: Path, cloud: clouds.Cloud, outcome: Outcome, laplacian: core.LaplaceBeltrami, arguments: Namespace
+    ) -> list[str]:
         found, table = outcome.made
         if clouds.kind_of(output) is not None:
             cloud.owner.add_profile(found.distance, found.values, table)

@@ -1,10 +1,17 @@
 """What is chosen for the results of tiles: sides, roughness, and the files that hold them."""
 
+from __future__ import annotations
+
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from . import core, tools
 from .orienting import add_viewpoint
 from .settings import Setting, add_setting
+
+if TYPE_CHECKING:
+    from argparse import ArgumentParser, Namespace
+    from collections.abc import Iterable
 
 _FORMATS = (".ply", ".laz", ".las", ".csv", ".xyz", ".npy")
 _ORIENT = Setting(
@@ -17,7 +24,7 @@ _ORIENT = Setting(
 _WAVELENGTH = tools.roughness.WAVELENGTH
 
 
-def add_measures(parser):
+def add_measures(parser: ArgumentParser) -> None:
     """Add options for what is computed, which is decided as a cloud is cut."""
     add_setting(parser, _ORIENT)
     add_viewpoint(parser, "--orient VIEWPOINT")
@@ -25,7 +32,7 @@ def add_measures(parser):
     add_setting(parser, _WAVELENGTH)
 
 
-def check_measures(parser, arguments):
+def check_measures(parser: ArgumentParser, arguments: Namespace) -> None:
     """Set what other options imply, and refuse what does not go together, by `parser.error`."""
     if arguments.viewpoint is not None and arguments.orient not in (None, "VIEWPOINT"):
         parser.error(f"--viewpoint goes with --orient VIEWPOINT, not {arguments.orient}")
@@ -33,7 +40,7 @@ def check_measures(parser, arguments):
         parser.error("--wavelength goes with --roughness")
 
 
-def measures(arguments):
+def measures(arguments: Namespace) -> dict[str, Any]:
     """Return what these options ask `core.tiles.cut_to_store` for, as its manifest holds it."""
     place = arguments.viewpoint
     implied = _ORIENT.default if place is None else "VIEWPOINT"
@@ -44,7 +51,7 @@ def measures(arguments):
     }
 
 
-def add_files_of_tiles(parser, name="--format"):
+def add_files_of_tiles(parser: ArgumentParser, name: str = "--format") -> None:
     """Add options for the files of results, one for each tile."""
     endings = [suffix[1:] for suffix in _FORMATS]
     parser.add_argument(
@@ -61,14 +68,14 @@ def add_files_of_tiles(parser, name="--format"):
     )
 
 
-def ending(arguments):
+def ending(arguments: Namespace) -> str:
     """Return how names of files of tiles end; empty where results stay in the store as .npz."""
     if arguments.tile_format == "npy":
         return ""
     return f"{'_smoothed' if arguments.smoothed else ''}.{arguments.tile_format}"
 
 
-def add_one_file(parser):
+def add_one_file(parser: ArgumentParser) -> None:
     """Add an option for one file of all results."""
     parser.add_argument(
         "--one-file",
@@ -78,7 +85,7 @@ def add_one_file(parser):
     )
 
 
-def check_one_file(parser, arguments, read):
+def check_one_file(parser: ArgumentParser, arguments: Namespace, read: Iterable[Path]) -> None:
     """Refuse a name that no such file can have, by `parser.error`, such as that of a file that is read."""
     path = arguments.one_file
     if path is None:

@@ -1,11 +1,14 @@
 """The verbs for clouds larger than memory: `tiles run`, and its stages one by one."""
 
+from __future__ import annotations
+
 import argparse
 import json
 import shutil
 import time
 from dataclasses import fields
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from . import core, tile_choices, tile_work
 from .inputs import add_choices, files_in, las_choices, parse_share
@@ -15,6 +18,11 @@ from .settings import LAPLACIAN, add_setting, chosen
 from .stages import ToldStages, tell_aside
 from .tile_work import STORE
 from .verb import DONE, ELSEWHERE, FAILED, ONE_LINE, Verb
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from tools.tool import Array, Progress
 
 _SETTINGS = [LAPLACIAN[field.name] for field in fields(core.LaplacianOptions)]
 _EACH = 0.01  # of the work is told
@@ -30,18 +38,18 @@ class _TileVerb(Verb):
     """A verb for tiles; what it says of itself is in full by its help."""
 
     @property
-    def description(self):
+    def description(self) -> str:  # type: ignore[override]  # computed
         """What it does, in full."""
         return f"{self.help[0].upper()}{self.help[1:]}. {ONE_LINE}"
 
-    def expand(self, path, arguments):
+    def expand(self, path: Path, arguments: argparse.Namespace) -> list[Path]:
         return [path]
 
-    def failure(self, result):
+    def failure(self, result: dict[str, Any]) -> int:
         scarce = [error.get("scarce", False) for error in result.get("errors", ())]
         return (ELSEWHERE if any(scarce) else FAILED) if scarce else DONE
 
-    def check(self, parser, arguments):
+    def check(self, parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> None:
         if arguments.part != (1, 1):
             parser.error("--part divides files, not tiles: use --tiles K/N with survey and measure")
 
@@ -50,9 +58,9 @@ class _Cutting(_TileVerb):
     """A verb that cuts files into tiles: all inputs together, into one folder."""
 
     inputs = "point clouds that are parts of one; or folders of such"
-    _own = ()  # the files that an earlier run has written, but for those of tiles, and its store
+    _own: tuple[Any, ...] = ()  # the files that an earlier run has written, but for those of tiles, and its store
 
-    def add_options(self, parser):
+    def add_options(self, parser: argparse.ArgumentParser) -> None:
         parser.add_argument(
             "--out-dir", dest="folder", type=Path, required=True, metavar="DIR", help="folder for the tiles and results"
         )
@@ -74,12 +82,12 @@ class _Cutting(_TileVerb):
         )
         parser.add_argument("--level", type=int, metavar="INT", help="last level of detail of COPC files to read")
 
-    def expand(self, path, arguments):
+    def expand(self, path: Path, arguments: argparse.Namespace) -> list[Path]:
         if not path.is_dir():
             return [path]
         return [file for file in files_in(path) if not self.owns(file, arguments)]
 
-    def owns(self, path, arguments):
+    def owns(self, path: Path, arguments: argparse.Namespace) -> bool:
         if not self._own:
             folder = arguments.folder / STORE
             store = core.tiles.Store(folder) if folder.exists() else None
@@ -89,10 +97,10 @@ class _Cutting(_TileVerb):
             return False
         return str(path.resolve()) in files or tile_work.is_tile_path(path, arguments.folder)
 
-    def written_once(self, arguments):
+    def written_once(self, arguments: argparse.Namespace) -> list[Path]:
         return [arguments.folder / _REPORT]
 
-    def check(self, parser, arguments):
+    def check(self, parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> None:
         if arguments.part != (1, 1):
             parser.error("--part would leave points out: all inputs are one cloud")
         if arguments.tile_points is not None and arguments.tile_points < 1:
@@ -105,12 +113,11 @@ class _Cutting(_TileVerb):
         tile_choices.check_measures(parser, arguments)
         arguments.sources, arguments.inputs = arguments.inputs, [arguments.folder]
 
-    def cut(self, arguments, count, progress):
+    def cut(self, arguments: argparse.Namespace, count: int, progress: Progress) -> tuple[core.tiles.Store, list[str]]:
         """Return the store of a folder, for so many workers, and the notices of what was read; cut it if need be."""
         given = chosen(_SETTINGS, arguments)
-        options = core.LaplacianOptions(
-            **{name: value.lower() if isinstance(value, str) else value for name, value in given.items()}
-        )
+        given = {name: value.lower() if isinstance(value, str) else value for name, value in given.items()}
+        options = core.LaplacianOptions(**given)
         if any(path.suffix.lower() in core.files.SCANS for path in arguments.sources):
             core.files.import_las()
         folder, memory = arguments.folder / STORE, arguments.memory or core.tiles.memory_of_worker(count)
@@ -152,12 +159,12 @@ class _Cutting(_TileVerb):
             return store, [*anew, *_notices(store)]
 
 
-def _stamps(arguments):
+def _stamps(arguments: argparse.Namespace) -> dict[str, list[int] | None]:
     """Return size and time of each file that is read."""
     return {str(path.resolve()): stamp(path) for path in arguments.sources}
 
 
-def _check_stamps(before, now, folder, since):
+def _check_stamps(before: dict[str, Any], now: dict[str, Any], folder: Path, since: str) -> None:
     """Refuse files that have changed since."""
     changed = [path for path, known in before.items() if now.get(path) != known]
     if changed:
@@ -170,7 +177,7 @@ def _check_stamps(before, now, folder, since):
         )
 
 
-def _wants_others(store, asked):
+def _wants_others(store: core.tiles.Store, asked: dict[str, Any]) -> bool:
     """Whether tiles of another size are wanted than a store has: not for other memory alone where all are measured."""
     before = store.manifest.get("asked", dict.fromkeys(_SIZES))
     other = [name for name in _SIZES if asked[name] not in (None, before[name])]
@@ -178,11 +185,11 @@ def _wants_others(store, asked):
     return "tile_points" in other or (bool(other) and not done)
 
 
-def _options(names):
+def _options(names: Iterable[str]) -> list[str]:
     return [f"--{name.replace('_', '-')}" for name in names]
 
 
-def _delete(store, folder):
+def _delete(store: core.tiles.Store, folder: Path) -> None:
     """Delete tiles that are cut anew, with their files."""
     for path in list(folder.iterdir()):
         if tile_work.is_tile_path(path, folder) and str(path.resolve()) not in store.manifest["sources"]:
@@ -190,23 +197,31 @@ def _delete(store, folder):
     shutil.rmtree(store.folder)
 
 
-def _one_files(store):
+def _one_files(store: core.tiles.Store) -> list[str]:
     """Return the files of all results that were written from a store."""
     path = store.folder / _ONE_FILES
     return json.loads(path.read_text(encoding="utf-8")) if path.exists() else []
 
 
-def _notices(store):
+def _notices(store: core.tiles.Store) -> list[str]:
     """Return what is to be told of the files that were cut."""
     columns = store.manifest["columns left out"]
     missing = [f"Left out {', '.join(columns)}, which not all files have."] if columns else []
     return [*store.manifest["notices"], *missing]
 
 
-def _cut(sources, folder, most, options, known, choices, progress):
+def _cut(
+    sources: tile_work.Sources,
+    folder: Path,
+    most: int,
+    options: core.LaplacianOptions,
+    known: dict[str, Any],
+    choices: dict[str, Any],
+    progress: Progress,
+) -> core.tiles.Store:
     begin = 0.0
 
-    def chunks():
+    def chunks() -> Iterator[tuple[Array, dict[str, Array]]]:
         nonlocal begin
         yield from sources(lambda share: progress("Read", begin + 0.5 * share))  # twice
         begin = 0.5
@@ -224,7 +239,7 @@ class TilesRun(_Cutting):
     name = "tiles run"
     help = "analyze a cloud larger than memory, tile by tile; a run that was stopped goes on where it was"
 
-    def add_options(self, parser):
+    def add_options(self, parser: argparse.ArgumentParser) -> None:
         super().add_options(parser)
         _add_modes(parser, 0)
         parser.add_argument("--workers", type=int, default=1, metavar="INT", help="processes on this machine")
@@ -232,18 +247,18 @@ class TilesRun(_Cutting):
         tile_choices.add_files_of_tiles(parser)
         tile_choices.add_one_file(parser)
 
-    def written_once(self, arguments):
+    def written_once(self, arguments: argparse.Namespace) -> list[Path]:
         several = [arguments.one_file, tile_work.tile_path(arguments.folder, 0, tile_choices.ending(arguments))]
         return [*super().written_once(arguments), *(path for path in several if path is not None and path.suffix)]
 
-    def check(self, parser, arguments):
+    def check(self, parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> None:
         super().check(parser, arguments)
         if arguments.workers < 1:
             parser.error("--workers must be at least 1")
         tile_choices.check_one_file(parser, arguments, arguments.sources)
         _check_modes(parser, arguments, 0)
 
-    def run(self, path, arguments, output):
+    def run(self, path: Path, arguments: argparse.Namespace, output: Path | None) -> dict[str, Any]:
         with core.files.alone_in(arguments.folder, _LOCK), _ToldTiles(self.name, _EACH) as stages:
             tile_work.check_workers(arguments.workers, arguments.scheduler, path)
             store, notices = self.cut(arguments, arguments.workers, _share(stages, 0.0, _READ))
@@ -251,7 +266,7 @@ class TilesRun(_Cutting):
                 core.tiles.ask_for_modes(store, arguments.modes, arguments.mode_points)
             with tile_work.workers(arguments.workers, arguments.scheduler) as spread:
 
-                def visit_all(step, numbers):
+                def visit_all(step: str, numbers: Sequence[int]) -> Iterable[int]:
                     [known] = [one for one in core.tiles.steps_of(store) if one.name == step]
                     many = [(str(store.folder), step, number) for number in numbers]
                     count = len(known.where(store))
@@ -270,15 +285,16 @@ class TilesRun(_Cutting):
 class _ToldTiles(ToldStages):
     """Tells at how many of all tiles a step is done, and the time that is left of all steps."""
 
-    def __init__(self, label, each):
+    def __init__(self, label: str, each: float) -> None:
         super().__init__(label, each)
-        self._tiles, self._first = "", None
+        self._tiles = ""
+        self._first: tuple[float, float] | None = None
 
-    def counted(self, visited, before, count):
+    def counted(self, visited: Iterable[int], before: int, count: int) -> Iterator[int]:
         """Count what is visited, after those before, from now on; return it."""
         self._tiles = f", {before} of {count} tiles"
 
-        def counted():
+        def counted() -> Iterator[int]:
             for done, one in enumerate(visited, before + 1):
                 self._tiles = f", {done} of {count} tiles"
                 yield one
@@ -286,7 +302,7 @@ class _ToldTiles(ToldStages):
 
         return counted()
 
-    def tell(self, stage, fraction):
+    def tell(self, stage: str, fraction: float) -> None:
         now = time.monotonic()
         began, before = self._first = self._first or (now, fraction)
         left = (now - began) * (1.0 - fraction) / (fraction - before) if fraction > before + _EACH else None
@@ -294,7 +310,7 @@ class _ToldTiles(ToldStages):
         tell_aside(f"{self._label}: {stage}{self._tiles}, {fraction:.0%}{rest}")
 
 
-def _duration(seconds):
+def _duration(seconds: float) -> str:
     """Write a time for people."""
     if seconds < 90.0:
         return f"{seconds:.0f} s"
@@ -307,7 +323,7 @@ class TilesCut(_Cutting):
     name = "tiles cut"
     help = "cut a cloud larger than memory into tiles, the first stage"
 
-    def run(self, path, arguments, output):
+    def run(self, path: Path, arguments: argparse.Namespace, output: Path | None) -> dict[str, Any]:
         with core.files.alone_in(arguments.folder, _LOCK), ToldStages(self.name, _EACH) as stages:
             store, notices = self.cut(arguments, 1, stages)
         errors = tile_work.file_records(store)
@@ -321,11 +337,13 @@ class _Stage(_TileVerb):
 
     inputs = "folders with tiles, of tiles cut"
 
-    def store(self, path):
+    def store(self, path: Path) -> core.tiles.Store:
         """Return the store in a folder."""
         return core.tiles.Store(path / STORE)
 
-    def visit(self, store, waiting, arguments):
+    def visit(
+        self, store: core.tiles.Store, waiting: tuple[Any, list[int]] | None, arguments: argparse.Namespace
+    ) -> dict[str, Any]:
         """Take a step at a share of the tiles that wait for it; none where nothing waits. Return which failed, too."""
         if waiting is None:
             return {"step": None, "visited": 0, "waiting": 0, "errors": []}
@@ -345,13 +363,13 @@ class TilesSurvey(_Stage):
     name = "tiles survey"
     help = "take the next step at the tiles, all or a share of them; tiles agree follows each"
 
-    def add_options(self, parser):
+    def add_options(self, parser: argparse.ArgumentParser) -> None:
         _add_share(parser)
 
-    def run(self, path, arguments, output):
+    def run(self, path: Path, arguments: argparse.Namespace, output: Path | None) -> dict[str, Any]:
         store = self.store(path)
         waiting = core.tiles.pending(store)
-        if store.agreed_after("measure") or waiting[0].name == "measure":
+        if waiting is None or store.agreed_after("measure") or waiting[0].name == "measure":
             return {**self.visit(store, None, arguments), "notices": ["The survey is done: measure the tiles."]}
         return {**self.visit(store, waiting, arguments), "notices": []}
 
@@ -362,7 +380,7 @@ class TilesAgree(_Stage):
     name = "tiles agree"
     help = "merge what the tiles have told in a step; prints the next one"
 
-    def run(self, path, arguments, output):
+    def run(self, path: Path, arguments: argparse.Namespace, output: Path | None) -> dict[str, Any]:
         store = self.store(path)
         waiting = core.tiles.pending(store)
         if waiting is not None and waiting[1]:
@@ -380,16 +398,16 @@ class TilesMeasure(_Stage):
     name = "tiles measure"
     help = "measure the tiles, all or a share of them, and write the results of each"
 
-    def add_options(self, parser):
+    def add_options(self, parser: argparse.ArgumentParser) -> None:
         _add_share(parser)
         tile_choices.add_files_of_tiles(parser)
 
-    def run(self, path, arguments, output):
+    def run(self, path: Path, arguments: argparse.Namespace, output: Path | None) -> dict[str, Any]:
         store = self.store(path)
         waiting = core.tiles.pending(store)
         if store.agreed_after("measure"):
             waiting = None
-        elif waiting[0].name != "measure":
+        elif waiting is not None and waiting[0].name != "measure":
             raise core.PointCloudError(f"{path} waits for the step {waiting[0].name} of the survey. Take it first.")
         found = self.visit(store, waiting, arguments)
         number, count = arguments.tiles
@@ -405,18 +423,18 @@ class TilesModes(_Stage):
     name = "tiles modes"
     help = "take the next step towards the low vibration modes at the tiles, all or a share; tiles agree follows each"
 
-    def add_options(self, parser):
+    def add_options(self, parser: argparse.ArgumentParser) -> None:
         _add_modes(parser, 10)
         _add_share(parser)
 
-    def check(self, parser, arguments):
+    def check(self, parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> None:
         super().check(parser, arguments)
         _check_modes(parser, arguments, 1)
 
-    def run(self, path, arguments, output):
+    def run(self, path: Path, arguments: argparse.Namespace, output: Path | None) -> dict[str, Any]:
         store = self.store(path)
         waiting = core.tiles.pending(store)
-        if not store.agreed_after("measure"):
+        if waiting is not None and not store.agreed_after("measure"):
             raise core.PointCloudError(f"{path} waits for the step {waiting[0].name}. Measure the tiles first.")
         core.tiles.ask_for_modes(store, arguments.modes, arguments.mode_points)
         waiting = core.tiles.pending(store)
@@ -431,17 +449,17 @@ class TilesReport(_Stage):
     outputs = TABLES
     prints_all = True
 
-    def add_options(self, parser):
+    def add_options(self, parser: argparse.ArgumentParser) -> None:
         tile_choices.add_files_of_tiles(parser, "--tile-format")
         tile_choices.add_one_file(parser)
 
-    def check(self, parser, arguments):
+    def check(self, parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> None:
         super().check(parser, arguments)
         if arguments.one_file is not None and len(arguments.inputs) > 1:
             parser.error("--one-file takes one folder of tiles")
         tile_choices.check_one_file(parser, arguments, [])
 
-    def run(self, path, arguments, output):
+    def run(self, path: Path, arguments: argparse.Namespace, output: Path | None) -> dict[str, Any]:
         store = self.store(path)
         found = _report(store, path, arguments)
         if output is not None:
@@ -452,12 +470,19 @@ class TilesReport(_Stage):
         return {**found, "notices": _finish(store, arguments)}
 
 
-def _share(progress, begin, end):
+def _share(progress: Progress, begin: float, end: float) -> Progress:
     """Return a progress callback whose fractions are those of a share of the work."""
     return lambda stage, fraction: progress(stage, begin + (end - begin) * fraction)
 
 
-def _write(store, folder, numbers, arguments, spread, progress=lambda stage, fraction: None):
+def _write(
+    store: core.tiles.Store,
+    folder: Path,
+    numbers: Sequence[int],
+    arguments: argparse.Namespace,
+    spread: tile_work.Spread,
+    progress: Progress = lambda stage, fraction: None,
+) -> None:
     """Write the results of some tiles."""
     suffix = tile_choices.ending(arguments)
     if not suffix:
@@ -469,7 +494,7 @@ def _write(store, folder, numbers, arguments, spread, progress=lambda stage, fra
         progress("Write", done / len(many))
 
 
-def _finish(store, arguments):
+def _finish(store: core.tiles.Store, arguments: argparse.Namespace) -> list[str]:
     """Write one file of all results, if that is asked for, and return what is to be told of the results."""
     notices = tile_work.doubts(store)
     if arguments.one_file is not None:
@@ -479,7 +504,7 @@ def _finish(store, arguments):
     return notices
 
 
-def _report(store, folder, arguments):
+def _report(store: core.tiles.Store, folder: Path, arguments: argparse.Namespace) -> dict[str, Any]:
     """Write the report of all tiles, a line of JSON for each, and return the totals with the errors."""
     records = tile_work.tile_records(store, folder, tile_choices.ending(arguments))
     files = tile_work.file_records(store)
@@ -492,7 +517,7 @@ def _report(store, folder, arguments):
     return {**tile_work.totals(store, records), **modes, "failed_files": len(files), "errors": errors}
 
 
-def _add_modes(parser, default):
+def _add_modes(parser: argparse.ArgumentParser, default: int) -> None:
     parser.add_argument(
         "--modes",
         type=int,
@@ -505,12 +530,12 @@ def _add_modes(parser, default):
     )
 
 
-def _check_modes(parser, arguments, least):
+def _check_modes(parser: argparse.ArgumentParser, arguments: argparse.Namespace, least: int) -> None:
     if arguments.modes < least or (arguments.mode_points is not None and arguments.mode_points < 1):
         parser.error("--modes and --mode-points are numbers above zero")
 
 
-def _add_share(parser):
+def _add_share(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--tiles",
         type=parse_share,
@@ -520,7 +545,7 @@ def _add_share(parser):
     )
 
 
-def _size(text):
+def _size(text: str) -> int:
     try:
         return tile_work.bytes_of(text)
     except ValueError as error:

@@ -1,16 +1,25 @@
 """Clouds larger than memory: what is read of their files, who works on their tiles, and what is written of each."""
 
+from __future__ import annotations
+
 import contextlib
 import logging
 import re
 import sys
 from pathlib import Path
 from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from . import clouds, core, quantities
 
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Sequence
+
+    from tools.tool import Array
+
+Spread: TypeAlias = "Callable[[Callable[..., Any], Sequence[tuple[Any, ...]]], Iterable[Any]]"
 STORE = "store"  # the folder within that of a run
 _TILE = re.compile(r"tile_\d{6,}(_smoothed)?\.\w+")
 _PIECE = 1_000_000  # points that are read at once
@@ -68,19 +77,29 @@ class Sources:
         The files that cannot be read, and why. They are left out.
     """
 
-    def __init__(self, paths, las, columns="", bounds=None, level=None):
+    def __init__(
+        self,
+        paths: Sequence[Path],
+        las: core.files.LasChoices,
+        columns: str = "",
+        bounds: Sequence[float] | None = None,
+        level: int | None = None,
+    ) -> None:
         self._columns = columns
-        self._choices = {
+        self._choices: dict[str, Any] = {
             "las": las,
             "bounds": None if bounds is None else np.reshape(bounds, (2, 3)),
             "level": level,
         }
         self._sizes = {path: path.stat().st_size if path.is_file() else 0 for path in paths}
-        self._counts = {}  # of points, as far as known
-        self.notices, self.full, self.las, self.broken = [], 0.0, None, {}
-        self._forms = {}
+        self._counts: dict[Path, int] = {}  # of points, as far as known
+        self.notices: list[str] = []
+        self.full = 0.0
+        self.las: core.files.LasForm | None = None
+        self.broken: dict[Path, core.PointCloudError] = {}
+        self._forms: dict[Path, core.files.LasForm | None] = {}
 
-    def __call__(self, progress):
+    def __call__(self, progress: Callable[[float], None]) -> Iterator[tuple[Array, dict[str, Array]]]:
         """Yield points, and their other numbers.
 
         Parameters
@@ -128,13 +147,13 @@ class Sources:
         self.las, differing = core.files.join_forms(forms, self.full)
         self.notices = core.files.join_notices([*self.notices, *left_out, *differing])
 
-    def _pieces(self, path):
+    def _pieces(self, path: Path) -> Iterator[tuple[Array, dict[str, Array]]]:
         """Yield the points of a file, and note what is to be told of it."""
         is_text, is_scan = (path.suffix.lower() in kinds for kinds in (core.files.TEXTS, core.files.SCANS))
         pieces = core.files.chunks(path, _PIECE, columns=self._columns if is_text else "", **self._choices)
         if is_scan:
             self._counts[path] = max(core.files.extent(path).count, 1)
-        corners = []
+        corners: list[Array] = []
         for points, columns in pieces:
             corners = [*corners, points.min(axis=0), points.max(axis=0)]
             corners = [np.min(corners, axis=0), np.max(corners, axis=0)]
@@ -151,25 +170,25 @@ class Incomplete(Exception):
     """Points of a file were given, and more cannot be read."""
 
 
-def is_tile_path(path, folder):
+def is_tile_path(path: Path, folder: str | Path) -> bool:
     """Whether a file may be that of the results of a tile, in the folder of a run."""
     return path.resolve().parent == Path(folder).resolve() and _TILE.fullmatch(path.name) is not None
 
 
-def tile_path(folder, number, suffix):
+def tile_path(folder: Path, number: int, suffix: str) -> Path:
     """Return the path of the results of a tile, in the folder of a run."""
     return Path(folder) / f"tile_{number:06d}{suffix}"
 
 
-def write_tile(store, number, path, smoothed):
+def write_tile(store: str, number: int, path: str, smoothed: bool) -> int:
     """Write the results of a tile, with the columns of its points, unless that is done; return its number."""
-    path, store = Path(path), core.tiles.Store(store)
-    if not path.exists() or path.stat().st_mtime_ns < store.changed(number, ("measure", "modes")):
-        core.files.write_pieces(path, lambda: [_table(store, number, smoothed)])
+    file, tiles = Path(path), core.tiles.Store(store)
+    if not file.exists() or file.stat().st_mtime_ns < tiles.changed(number, ("measure", "modes")):
+        core.files.write_pieces(file, lambda: [_table(tiles, number, smoothed)])
     return number
 
 
-def write_one(store, path, smoothed):
+def write_one(store: core.tiles.Store, path: Path, smoothed: bool) -> list[str]:
     """Write the results of all tiles that could be measured to one file, and return notices."""
     waiting = core.tiles.pending(store)
     if waiting is not None:
@@ -179,7 +198,7 @@ def write_one(store, path, smoothed):
     return core.files.write_pieces(path, lambda: (_table(store, number, smoothed) for number in store.alive))
 
 
-def _table(store, number, smoothed):
+def _table(store: core.tiles.Store, number: int, smoothed: bool) -> core.files.PointTable:
     """Return the points of a tile, as they were read or where they are on the surface, with columns and results."""
     found = {name: store.read("measure", number, name) for name in store.names("measure", number)}
     results = SimpleNamespace(laplacian=SimpleNamespace(**found), mean_curvature=found["mean_curvature"])
@@ -200,7 +219,7 @@ def _table(store, number, smoothed):
     return clouds.with_results(core.files.PointTable(points, columns, colors, las=las), measures)
 
 
-def doubts(store):
+def doubts(store: core.tiles.Store) -> list[str]:
     """Return notices on what halos are too narrow for."""
     found = core.tiles.doubted_wavelength(store.record, store.manifest["halo"])
     if found is None:
@@ -212,12 +231,12 @@ def doubts(store):
     ]
 
 
-def one_by_one(function, many):
+def one_by_one(function: Callable[..., Any], many: Iterable[tuple[Any, ...]]) -> Iterator[Any]:
     """Call a function with each of some arguments in this process, and yield its results."""
     return (function(*given) for given in many)
 
 
-def check_workers(count, address, folder):
+def check_workers(count: int, address: str, folder: Path) -> None:
     """Refuse to begin where Dask is missing, or workers of a cluster that do not see a folder, or no cluster at all.
 
     Raises
@@ -242,12 +261,12 @@ def check_workers(count, address, folder):
         )
 
 
-def sees_folder(folder):
+def sees_folder(folder: str) -> bool:
     """Whether this process sees a folder."""
     return Path(folder).is_dir()
 
 
-def _imported():
+def _imported() -> tuple[Any, Any]:
     """Return Dask's packages."""
     try:
         import dask
@@ -260,7 +279,7 @@ def _imported():
 
 
 @contextlib.contextmanager
-def _client(address):
+def _client(address: str) -> Iterator[Any]:
     """Connect to a scheduler."""
     _, distributed = _imported()
     _silence()
@@ -275,19 +294,19 @@ def _client(address):
         yield client
 
 
-def _silence():
+def _silence() -> None:
     """Let Dask log nothing, by any of its loggers, most of which have their own level: we tell what matters of it."""
     for name in list(logging.root.manager.loggerDict):
         if name.partition(".")[0] in ("asyncio", "distributed"):
             logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
-def _brief(error):
+def _brief(error: Exception) -> str:
     return f"{type(error).__name__}: {' '.join(str(error).split())[:_BRIEF]}".removesuffix(": ")
 
 
 @contextlib.contextmanager
-def workers(count, address):
+def workers(count: int, address: str) -> Iterator[Spread]:
     """Provide a function that calls another with a folder, and each of some arguments, on all workers.
 
     Parameters
@@ -323,7 +342,7 @@ def workers(count, address):
             stack.callback(_close, address, count)
         client = stack.enter_context(_client(address))
 
-        def spread(function, many):
+        def spread(function: Callable[..., Any], many: Sequence[tuple[Any, ...]]) -> Iterator[Any]:
             futures = client.map(function, *zip(*many, strict=True), pure=False) if many else []
             try:
                 yield from (done.result() for done in distributed.as_completed(futures))
@@ -342,7 +361,7 @@ def workers(count, address):
         yield spread
 
 
-def _close(cluster, count):
+def _close(cluster: Any, count: int) -> None:
     """End the workers of this machine. What they were to do is done by now, or its error is on the way."""
     with contextlib.suppress(TimeoutError):
         cluster.wait_for_workers(count, timeout=_CLOSING)  # one that is just starting again would stumble
@@ -353,13 +372,13 @@ def _close(cluster, count):
         print(f"Workers are ended with the program, for Dask did not close them: {error!r}", file=sys.stderr)
 
 
-def seconds_of(store, number):
+def seconds_of(store: core.tiles.Store, number: int) -> float:
     """Return the CPU seconds that the steps have taken at a tile."""
     done = [step.name for step in core.tiles.steps_of(store) if store.done(step.name, number)]
     return sum(float(store.read(step, number, "seconds")) for step in done)
 
 
-def tile_records(store, folder, suffix):
+def tile_records(store: core.tiles.Store, folder: Path, suffix: str) -> list[dict[str, Any]]:
     """Return what a report tells of each tile: its points, area, seconds and notices, or the error."""
     records = []
     for number in range(store.count):
@@ -383,23 +402,23 @@ def tile_records(store, folder, suffix):
     return records
 
 
-def failure(store, number):
+def failure(store: core.tiles.Store, number: int) -> dict[str, Any]:
     """Return what is told of a tile that failed."""
     return {"tile": number, "error": store.error(number), "scarce": store.is_scarce(number)}
 
 
-def file_records(store):
+def file_records(store: core.tiles.Store) -> list[dict[str, Any]]:
     """Return what a report tells of each file that was left out."""
     broken = store.manifest["broken"]
     return [{"file": path, "elapsed": 0.0, "error": error} for path, error in broken.items()]
 
 
-def eigenvalues(store):
+def eigenvalues(store: core.tiles.Store) -> list[float]:
     """Return the eigenvalues of the modes that all tiles have."""
     return next(store.told("spectrum", "values")).tolist()
 
 
-def totals(store, records):
+def totals(store: core.tiles.Store, records: list[dict[str, Any]]) -> dict[str, Any]:
     """Return the sums over all tiles."""
     measured = [record for record in records if "total_area" in record]
     components, points, on, doubtful = set(), sum(record["points"] for record in records), 0, 0
@@ -421,7 +440,7 @@ def totals(store, records):
     }
 
 
-def bytes_of(text):
+def bytes_of(text: str) -> int:
     """Parse a size such as 2GB or 500MB as bytes.
 
     Raises

@@ -1,13 +1,20 @@
 """What points take from the surface of others, for the command line and for Blender's tools."""
 
+from __future__ import annotations
+
 import math
 from fnmatch import fnmatchcase
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from . import core, quantities
 from .settings import Setting
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Mapping, Sequence
+
+    from tools.tool import Array, Progress
 
 FILLED, TAKEN, FAR = range(len(quantities.quantity(quantities.TRANSFER).names))
 _NAMED = 5  # attributes that a notice names
@@ -61,22 +68,31 @@ class Match(NamedTuple):
         About surfaces whose sheets are hardly told apart.
     """
 
-    laplacian: "core.LaplaceBeltrami"
-    places: "core.rig.SurfaceMatch"
+    laplacian: core.LaplaceBeltrami
+    places: core.rig.SurfaceMatch
     state: np.ndarray
-    notices: list
+    notices: list[str]
 
-    def share(self, state) -> float:
+    def share(self, state: int) -> float:
         """Return the share of the points in a state."""
         return np.count_nonzero(self.state == state) / len(self.state)
 
     @property
-    def figures(self) -> dict:
+    def figures(self) -> dict[str, Any]:
         """What the command line prints of it."""
         return {"taken_count": int(self.places.known.sum()), "within": self.places.limit}
 
 
-def matched(laplacian, sources, offsets, own, name, names, progress, members=None) -> Match:
+def matched(
+    laplacian: core.LaplaceBeltrami,
+    sources: list[core.LaplaceBeltrami],
+    offsets: Sequence[Array],
+    own: Any,
+    name: str,
+    names: Sequence[str],
+    progress: Progress,
+    members: Sequence[Array] | None = None,
+) -> Match:
     """Find the places of points on the surface of others.
 
     Parameters
@@ -116,17 +132,19 @@ def matched(laplacian, sources, offsets, own, name, names, progress, members=Non
     return Match(laplacian, places, state, [text for named in each for text in _close_sheets(*named)])
 
 
-def _close_sheets(name, laplacian) -> list:
+def _close_sheets(name: str, laplacian: core.LaplaceBeltrami) -> list[str]:
     """Return a notice of the points of a cloud of some name between whose sheets values may get across."""
     causes = core.Doubt
-    count = np.count_nonzero(laplacian.doubt == causes.SHEETS)
+    count = int(np.count_nonzero(laplacian.doubt == causes.SHEETS))
     return [
         f"Sheets of {name} are as close to each other as its points are, at {count:,} of them. Values may get from one"
         " sheet to the other there. Add points, or transfer each sheet alone."
     ][: min(count, 1)]
 
 
-def told(match, what, name, names, length_text, preview=False) -> tuple:
+def told(
+    match: Match, what: str, name: str, names: str, length_text: Callable[[float], str], preview: bool = False
+) -> tuple[list[str], str]:
     """Return notices of how points of some name get what they take from others, and a line."""
     far = np.count_nonzero(match.state == FAR)
     take, are = ("would take", "would be") if preview else ("take", "are")
@@ -141,7 +159,7 @@ def told(match, what, name, names, length_text, preview=False) -> tuple:
     return [*([notice] if far else []), *match.notices], line
 
 
-def is_wanted(name, own, color) -> bool:
+def is_wanted(name: str, own: Any, color: str) -> bool:
     """Whether an attribute is transferred by settings, which may ask for the colors alone."""
     if own.attributes == "COLOR":
         return name == color
@@ -151,7 +169,7 @@ def is_wanted(name, own, color) -> bool:
     return fnmatchcase(name, own.pattern) and (not ours or bool(quantities.quantity(name).attribute))
 
 
-def check_found(found, own, where):
+def check_found(found: Collection[str], own: Any, where: str) -> None:
     """Refuse a source of some name that has nothing that the settings ask for."""
     if not found:
         what = {
@@ -162,7 +180,7 @@ def check_found(found, own, where):
         raise core.PointCloudError(f"{where} has no {what}. Choose other Attributes, or another source.")
 
 
-def left_out(names) -> list:
+def left_out(names: Sequence[str]) -> list[str]:
     """Return a notice of attributes that are not transferred."""
     if not names:
         return []
@@ -172,12 +190,12 @@ def left_out(names) -> list:
     ]
 
 
-def counted(names) -> str:
+def counted(names: Collection[str]) -> str:
     """Return how many attributes there are as a text."""
     return f"{len(names)} {'attribute' if len(names) == 1 else 'attributes'}"
 
 
-def taken(match, arrays, smooth, progress) -> dict:
+def taken(match: Match, arrays: Mapping[str, Array], smooth: Sequence[str], progress: Progress) -> dict[str, Array]:
     """Return the values of the points by name: averages of the smooth ones, and others from the nearest point each."""
     result = {}
     if smooth:

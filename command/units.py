@@ -1,6 +1,9 @@
 """In which unit the numbers of an attribute are written."""
 
+from __future__ import annotations
+
 from types import SimpleNamespace
+from typing import Any
 
 from . import quantities
 
@@ -32,7 +35,7 @@ def attribute_power(name: str) -> int:
     return 0 if row.numbered else row.power
 
 
-def unit(power: int, greatest: float, settings):
+def unit(power: int, greatest: float, settings: Any) -> tuple[str, float]:
     """Choose a unit for a power of a length in a scene.
 
     Parameters
@@ -56,7 +59,7 @@ def unit(power: int, greatest: float, settings):
     if power == 0 or settings.system == "NONE":
         return "", 1.0
     if settings.length_unit not in _LEFT_OPEN:
-        names = (settings.length_unit,)
+        names: tuple[str, ...] = (settings.length_unit,)
     elif power > 0:
         names = _ADAPTIVE[settings.system]
     else:

@@ -1,5 +1,9 @@
 """The verbs that need no Blender."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 from . import analysis, clouds, core, quantities
 from .analysis import WRITE_LIMIT
 from .bending import Deform, SplatInfo
@@ -12,6 +16,13 @@ from .summary import Report
 from .table_verbs import ProfileVerb, SectionVerb
 from .tile_verbs import TilesAgree, TilesCut, TilesMeasure, TilesModes, TilesReport, TilesRun, TilesSurvey
 from .tool_verb import declared_verbs
+from .verb import Verb
+
+if TYPE_CHECKING:
+    from argparse import ArgumentParser, Namespace
+    from pathlib import Path
+
+    from tools.tool import Array, Progress
 
 _DECLARED = {
     "align_points": AlignVerb,
@@ -24,12 +35,12 @@ _DECLARED = {
 }
 
 
-def make_verbs() -> list:
+def make_verbs() -> list[Verb]:
     """Return new verbs of all kinds: those on surfaces, those on points, and those that need no object."""
     return [Analyze(), *declared_verbs(_DECLARED), TransferAttributes(), *without_object()]
 
 
-def without_object() -> list:
+def without_object() -> list[Verb]:
     """Return new verbs that in Blender, too, need no object."""
     on_tiles = TilesRun(), TilesCut(), TilesSurvey(), TilesAgree(), TilesMeasure(), TilesModes(), TilesReport()
     return [Info(), Convert(), SplatInfo(), Deform(), Report(), *on_tiles]
@@ -42,7 +53,9 @@ class Info(CloudVerb):
     help = "summarize files of points: number, bounds, spacing, columns"
     outputs = ()
 
-    def work(self, path, given, arguments, output, progress):
+    def work(
+        self, path: Path, given: clouds.Given, arguments: Namespace, output: Path | None, progress: Progress
+    ) -> tuple[dict[str, Any], list[str]]:
         cloud = clouds.Cloud(path, given, floaters=False)
         return {
             "points": len(cloud.points),
@@ -60,7 +73,9 @@ class Convert(CloudVerb):
     name = "convert"
     help = "write points to another kind of file, with all their columns"
 
-    def work(self, path, given, arguments, output, progress):
+    def work(
+        self, path: Path, given: clouds.Given, arguments: Namespace, output: Path | None, progress: Progress
+    ) -> tuple[dict[str, Any], list[str]]:
         if output is None:
             raise core.PointCloudError("Nothing would be written. Give --out or --out-dir.")
         if isinstance(given, core.splats.Splats):
@@ -71,12 +86,12 @@ class Convert(CloudVerb):
         return {"points": len(given.points)}, written
 
 
-class Frames:
+class Frames(Verb):
     """A verb that takes its inputs as frames of a sequence, if the option `sequence` is given."""
 
     prints_all = True  # but what is at each point, which is said on standard error
 
-    def add_sequence(self, parser):
+    def add_sequence(self, parser: ArgumentParser) -> None:
         """Add the option."""
         parser.add_argument(
             "--sequence",
@@ -85,13 +100,13 @@ class Frames:
             " that eigenvalues need not ascend; overlaps of the two are written, too",
         )
 
-    def expand(self, path, arguments):
+    def expand(self, path: Path, arguments: Namespace) -> list[Path]:
         """Return the numbered files of a folder."""
         if arguments.sequence and path.is_dir():
             return core.files.numbered_files(path)
         return super().expand(path, arguments)
 
-    def check_sequence(self, parser, arguments, modes):
+    def check_sequence(self, parser: ArgumentParser, arguments: Namespace, modes: int) -> None:
         """Refuse what does not go with a sequence, by `parser.error`."""
         if arguments.sequence and not modes:
             parser.error("--sequence matches modes: give --modes, too")
@@ -108,22 +123,24 @@ class Analyze(Frames, SurfaceVerb):
         Setting("modes", "how many vibration modes to compute", 0, 0),
         Setting("write_limit", "modes written as attributes at most", WRITE_LIMIT, 1),
     )
-    _earlier = None  # modes and points of the frame before
+    _earlier: tuple[core.Spectrum, Array] | None = None  # modes and points of the frame before
 
-    def add_options(self, parser):
+    def add_options(self, parser: ArgumentParser) -> None:
         self.add_sequence(parser)
         super().add_options(parser)
 
-    def check(self, parser, arguments):
+    def check(self, parser: ArgumentParser, arguments: Namespace) -> None:
         self.check_sequence(parser, arguments, chosen(self.settings, arguments)["modes"])
 
-    def work(self, path, given, arguments, output, progress):
+    def work(
+        self, path: Path, given: clouds.Given, arguments: Namespace, output: Path | None, progress: Progress
+    ) -> tuple[dict[str, Any], list[str]]:
         cloud, own = clouds.Cloud(path, given, floaters(arguments)), chosen(self.settings, arguments)
         built = self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress)
-        laplacian, spectrum, notices, matched = built.laplacian, None, [], {}
+        laplacian, spectrum, notices, matched = built.laplacian, None, list[str](), dict[str, Any]()
         if own["modes"]:
             spectrum, notices = analysis.resolved_modes(laplacian, own["modes"], progress)
-        if arguments.sequence:
+        if arguments.sequence and spectrum is not None:
             places = cloud.points + cloud.place
             spectrum, overlaps, self._earlier = analysis.continued(spectrum, laplacian.areas, places, self._earlier)
             matched["overlaps"] = overlaps.tolist()

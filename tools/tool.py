@@ -21,7 +21,7 @@ Subject = TypeVar("Subject")
 class Length(Protocol):
     """A function that writes a length as a text; with a power of 2 an area, with 3 a volume."""
 
-    def __call__(self, size: float, power: int = 1) -> str:
+    def __call__(self, size: float, /, power: int = 1) -> str:
         """Return the text."""
 
 
@@ -44,11 +44,17 @@ class Cloud(Protocol):
     out: Array  # (m,) int, floaters among splats that operators leave out
     repeats: bool  # whether settings are adjusted, which must not take long
     points: Array  # (n, 3), with lengths as the results have them
-    boundary: Array | None  # (n,) bool, points of the boundary, where a group names them
-    options: core.LaplacianOptions  # of the default method, where the paper's operator is not usable
     place: Array  # (3,), less which the points are
     heights_from: Array  # (3,), the same where heights are told, which in Blender are those in the scene
     orientation: Array | None  # (n, 3), to the side of the normals that was chosen, 0 where none was
+
+    @property
+    def boundary(self) -> Array | None:
+        """Points of the boundary, (n,) bool, where a group names them."""
+
+    @property
+    def options(self) -> core.LaplacianOptions:
+        """Those of the default method, where the paper's operator is not usable."""
 
     def named(self, setting: str) -> str:
         """Return what a setting is called there, for errors."""
