@@ -56,7 +56,7 @@ class SectionVerb(ToolVerb):
     def beside(self, output: Path, arguments: Namespace) -> list[Path]:
         return [output.with_name(f"{output.stem}_curves.csv")] if arguments.curves else []
 
-    def inputs(self, cloud: clouds.Cloud, arguments: Namespace) -> tuple[Any, Any]:  # type: ignore[override]  # another thing
+    def inputs(self, cloud: clouds.Cloud, arguments: Namespace) -> tuple[Any, Any]:  # type: ignore[override]  # of the tool
         (position, normal, told, name), own = super().inputs(cloud, arguments)
         normal = normal if arguments.normal is None else arguments.normal
         if isinstance(arguments.plane, str):

@@ -51,7 +51,7 @@ class _Declared(CloudVerb):
         if "sources" in self.tool.reads:
             check_sources(parser, arguments)
 
-    def inputs(self, cloud: clouds.Cloud, arguments: Namespace) -> tuple[Any, Any]:  # type: ignore[override]  # another thing
+    def inputs(self, cloud: clouds.Cloud, arguments: Namespace) -> tuple[Any, Any]:  # type: ignore[override]  # of the tool
         """Return what the tool takes beside the points, and the values of its settings as attributes."""
         own = SimpleNamespace(**chosen(self.settings, arguments))
         return self.tool.inputs(FileCloud(cloud, arguments, self, cloud.path.stem), own), own
