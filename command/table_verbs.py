@@ -56,8 +56,8 @@ class SectionVerb(ToolVerb):
     def beside(self, output: Path, arguments: Namespace) -> list[Path]:
         return [output.with_name(f"{output.stem}_curves.csv")] if arguments.curves else []
 
-    def inputs(self, cloud: clouds.Cloud, arguments: Namespace) -> tuple[Any, Any]:  # type: ignore[override]  # of the tool
-        (position, normal, told, name), own = super().inputs(cloud, arguments)
+    def taken(self, cloud: clouds.Cloud, arguments: Namespace) -> tuple[Any, Any]:
+        (position, normal, told, name), own = super().taken(cloud, arguments)
         normal = normal if arguments.normal is None else arguments.normal
         if isinstance(arguments.plane, str):
             position, normal = cloud.owner.plane(arguments.plane)

@@ -51,7 +51,7 @@ class _Declared(CloudVerb):
         if "sources" in self.tool.reads:
             check_sources(parser, arguments)
 
-    def inputs(self, cloud: clouds.Cloud, arguments: Namespace) -> tuple[Any, Any]:  # type: ignore[override]  # of the tool
+    def taken(self, cloud: clouds.Cloud, arguments: Namespace) -> tuple[Any, Any]:
         """Return what the tool takes beside the points, and the values of its settings as attributes."""
         own = SimpleNamespace(**chosen(self.settings, arguments))
         return self.tool.inputs(FileCloud(cloud, arguments, self, cloud.path.stem), own), own
@@ -94,7 +94,7 @@ class ToolVerb(_Declared, SurfaceVerb):
         self, path: Path, given: clouds.Given, arguments: Namespace, output: Path | None, progress: Progress
     ) -> tuple[dict[str, Any], list[str]]:
         cloud = clouds.Cloud(path, given, floaters(arguments))
-        inputs, own = self.inputs(cloud, arguments)
+        inputs, own = self.taken(cloud, arguments)
         laplacian = self.laplacian(cloud, arguments, progress)
         found = self.compute(cloud, laplacian, inputs, own, arguments, progress)
         figures, notices = self.written(cloud, found, laplacian, own, output, arguments)
@@ -115,7 +115,7 @@ class PointVerb(_Declared, CloudVerb):
         self, path: Path, given: clouds.Given, arguments: Namespace, output: Path | None, progress: Progress
     ) -> tuple[dict[str, Any], list[str]]:
         cloud = clouds.Cloud(path, given, floaters(arguments))
-        inputs, own = self.inputs(cloud, arguments)
+        inputs, own = self.taken(cloud, arguments)
         found = self.compute(cloud, cloud.points, inputs, own, arguments, progress)
         return self.written(cloud, found, cloud.points, own, output, arguments)
 

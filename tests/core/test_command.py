@@ -426,6 +426,7 @@ def test_every_verb_explains_itself(run, verb, capsys):
     shown = capsys.readouterr().out
     assert shown.startswith(f"usage: meshfree {verb} ")
     assert "JSON line" in " ".join(shown.split())
+    assert "<" not in shown  # of Python's own words for its objects
     assert run(verb, "--nonsense") == (2, [])
 
 
