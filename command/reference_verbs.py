@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from tools.tool import Array, Outcome, Progress
 
-    from . import core
-
 
 class WithReference(CloudVerb):
     """A verb with another file, which is read once, before the first input."""

@@ -14,15 +14,13 @@ from ...command.settings import LAPLACIAN, add_setting
 from ...core import PointCloudError
 from ...core.files import SCANNER, PointTable
 from ...core.files.table import NORMAL as FILE_NORMAL
-from ...tools.quantities import APPLICATIONS, MEAN_CURVATURE, NORMAL, ORIENTATION, RESULTS, quantity
+from ...tools.quantities import APPLICATIONS, MEAN_CURVATURE, NORMAL, ORIENTATION, RESULTS
 from ..objects.attributes import (
     DISC,
     check_size,
     own_positions,
     remove_attributes,
-    remove_numbered,
     tag_changed,
-    write_attribute,
     write_own_positions,
 )
 from ..objects.colors import own_colors
@@ -34,8 +32,8 @@ from ..objects.notices import renew
 from ..objects.place import activate, check_movable, hide, move_object, offset_of, place_of
 from ..objects.planes import object_of, plane_of
 from ..objects.positions import check_movable as check_points_movable
-from ..objects.reading import TYPES, Reading, checked_matrix, obstacle, reading_notices, sharing_objects
-from ..objects.result import check_writable, note_stages, write_result
+from ..objects.reading import TYPES, Reading, checked_matrix, local_values, obstacle, reading_notices, sharing_objects
+from ..objects.result import check_writable, note_stages, write_numbers, write_result, write_values
 from ..objects.splats import has_splats, write_splats
 from ..tools.analyze import Analysis
 from ..tools.mesh import close_holes
@@ -107,9 +105,7 @@ class Owner:
         if isinstance(given, PointTable) and stays and given.colors is not self.before.colors:
             _write_colors(obj.data, given.colors)
         self._write_results(results)
-        for name, values in numbers.items():
-            # As a list: Blender writes an array into the memory of the one before, whatever the length of that.
-            obj[name] = values.tolist()
+        write_numbers(obj, numbers)
         tag_changed(obj.data)
         shown = [NORMAL] if ORIENTATION in results else [] if _is_analysis(results) else results
         self._show([*changed, *shown, *APPLICATIONS, MEAN_CURVATURE])
@@ -155,14 +151,10 @@ class Owner:
 
     def _local_values(self, name, vectors):
         """Return vectors, (n, 3), in the space of the object, of the kind that their name says; others as they are."""
-        if vectors.shape[1:] != (3,):
-            return vectors
         reading = Reading(None, _linear(self.obj))
-        if name == SCANNER:
+        if name == SCANNER and vectors.ndim == 2:
             return reading.local(vectors - place_of(self.obj))
-        if name in (FILE_NORMAL, ORIENTATION) or quantity(name).carried == "normal":
-            return reading.local_normals(vectors)
-        return (reading.local_directions if quantity(name).is_direction else reading.local)(vectors)
+        return local_values(reading, NORMAL if name == FILE_NORMAL else name, vectors)
 
     def _write_results(self, results):
         """Write results, of which those of an analysis count as one of the object."""
@@ -172,13 +164,8 @@ class Owner:
             measures = {name: results[name] for name in RESULTS}
             found = Analysis(None, measures, local[NORMAL], None, 0, {}, [])
             write_result(obj, found, 0, oriented=ORIENTATION in results)
-        prefixes = [quantity(name).attribute for name in results if quantity(name).numbered]
-        for prefix in dict.fromkeys(prefixes):
-            remove_numbered(obj.data, prefix, beyond=prefixes.count(prefix))
         known = {*RESULTS, ORIENTATION} if _is_analysis(results) else ()
-        for name in results:
-            if name not in known:
-                write_attribute(obj.data, name, local[name])
+        write_values(obj.data, {name: values for name, values in local.items() if name not in known})
 
     def _show(self, names):
         """Show the first of some attributes that is there, or else the colors of the points."""

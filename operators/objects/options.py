@@ -5,6 +5,7 @@ from dataclasses import fields
 import numpy as np
 
 from ...core import LaplacianOptions, PaperOptions
+from ...tools import laplacian
 
 DEFAULTS, PAPER_DEFAULTS = LaplacianOptions(), PaperOptions()
 
@@ -37,12 +38,12 @@ def settings_values(settings) -> dict:
 
 def laplacian_options(settings) -> LaplacianOptions | PaperOptions:
     """Return the options of the operator, by the method of the settings."""
-    return (PaperOptions if settings.laplacian == "PAPER" else LaplacianOptions)(**_values(settings, _names(settings)))
+    return laplacian.laplacian_options(_values(settings, NAMES))
 
 
 def default_options(settings) -> LaplacianOptions:
     """Return the options of the default method, where the paper's operator is not usable."""
-    return LaplacianOptions(**_values(settings, _DEFAULT))
+    return laplacian.default_options(_values(settings, NAMES))
 
 
 def point_budget(settings):

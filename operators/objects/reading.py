@@ -8,7 +8,7 @@ import numpy as np
 
 from ... import core
 from ...core import PointCloudError
-from ...tools.quantities import ORIENTATION
+from ...tools.quantities import ORIENTATION, quantity
 from .attributes import CORNER, has_vectors, own_positions, point_count, read_attribute
 from .counting import members
 from .evaluated import evaluated_positions
@@ -118,6 +118,16 @@ class Reading:
     def placed_normals(self, normals):
         """Transform local normals to those of the points as read, of any length."""
         return normals @ np.linalg.inv(self.matrix)
+
+
+def local_values(reading, name, values):
+    """Return values of an attribute of some name in local space: vectors, (n, 3), by what they are; others as given."""
+    if values.shape[1:] != (3,):
+        return values
+    row = quantity(name)
+    if name == ORIENTATION or row.carried == "normal":
+        return reading.local_normals(values)
+    return (reading.local_directions if row.is_direction else reading.local)(values)
 
 
 def _units(vectors):

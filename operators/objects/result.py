@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 
 from ...core import PointCloudError
-from ...tools.quantities import AREA, EIGENVALUES, EIGENVECTOR, NORMAL, RESULTS, eigenvector_name
+from ...tools.quantities import AREA, EIGENVALUES, EIGENVECTOR, NORMAL, RESULTS, eigenvector_name, quantity
 from .attributes import (
     ORIENTATION,
     check_names,
@@ -54,6 +54,22 @@ def analysis_names(modes: int) -> list:
     return [*RESULTS, *map(eigenvector_name, range(1, modes + 1))]
 
 
+def write_numbers(obj, numbers):
+    """Keep numbers that are not at the points on an object, by name."""
+    for name, values in numbers.items():
+        # As a list: Blender writes an array into the memory of the one before, whatever the length of that.
+        obj[name] = values.tolist()
+
+
+def write_values(data, local):
+    """Write results at the points in local space, by the names of attributes; numbered ones in place of all others."""
+    prefixes = [quantity(name).attribute for name in local if quantity(name).numbered]
+    for prefix in dict.fromkeys(prefixes):
+        remove_numbered(data, prefix, beyond=prefixes.count(prefix))
+    for name, values in local.items():
+        write_attribute(data, name, values)
+
+
 def write_result(obj, analysis, write_limit: int, oriented=False):
     """Write an analysis to its object and those that share its mesh; modes up to `write_limit` become attributes.
 
@@ -66,8 +82,7 @@ def write_result(obj, analysis, write_limit: int, oriented=False):
         for index, vector in enumerate(vectors.T):
             write_attribute(mesh, eigenvector_name(index + 1), vector)
         for owner in owners:
-            # As a list: Blender writes an array into the memory of the one before, whatever the length of that.
-            owner[EIGENVALUES] = analysis.spectrum.eigenvalues.tolist()
+            write_numbers(owner, {EIGENVALUES: analysis.spectrum.eigenvalues})
     elif is_stale(obj):
         remove_numbered(mesh, EIGENVECTOR, beyond=0)
         for owner in owners:

@@ -8,10 +8,9 @@ from ... import core
 from ...command.naming import naming
 from ...tools.groups import check_vectors
 from ...tools.listed import listed_tools
-from ...tools.quantities import quantity
 from ...tools.settings import by_name
 from ...tools.tool import MovingTool, PointTool
-from ..objects.attributes import read_attribute, remove_numbered, tag_changed, write_attribute
+from ..objects.attributes import read_attribute, tag_changed
 from ..objects.curves import read_curve
 from ..objects.deleting import check_deletable, keep_points
 from ..objects.groups import chosen_weights, group_kind, has_group
@@ -19,7 +18,8 @@ from ..objects.options import default_options
 from ..objects.place import place_of
 from ..objects.positions import check_movable, target_property, write_positions
 from ..objects.properties import properties_of, values_of
-from ..objects.result import length_text
+from ..objects.reading import local_values
+from ..objects.result import length_text, write_numbers, write_values
 from ..objects.splats import has_splats
 from ..registration import Registration
 from ..running import cache
@@ -163,17 +163,10 @@ class Declared(Tool):
     def write(self, context, obj, result):
         found, laplacian, own, reading = result
         outcome = self.tool.finish(found, laplacian, own, length_text)
-        for name, values in outcome.values.items():
-            row = quantity(name)
-            if row.numbered:
-                remove_numbered(obj.data, row.attribute, beyond=len(outcome.values))
-            if row.along_surface:
-                values = reading.local_directions(values)
-            elif row.carried == "normal":
-                values = reading.local_normals(values)
-            write_attribute(obj.data, name, values)
+        local = {name: local_values(reading, name, values) for name, values in outcome.values.items()}
+        write_values(obj.data, local)
         tag_changed(obj.data)
-        _write_numbers(obj, outcome)
+        write_numbers(obj, outcome.numbers)
         return [f"{obj.name}: {text}" for text in (*outcome.notices, outcome.line)]
 
 
@@ -233,18 +226,11 @@ class Moving(Declared):
         if outcome.points is not None:
             title = self.tool.title(found)
             self.put(context, write_positions(obj, reading, outcome.points, self.goal, title, gradients, discs))
-        _write_numbers(obj, outcome)
+        write_numbers(obj, outcome.numbers)
         return [f"{obj.name}: {text}" for text in (*outcome.notices, outcome.line)]
 
     def put(self, context, key):
         """Finish with the shape key that holds the result, if there is one."""
-
-
-def _write_numbers(obj, outcome):
-    """Write results that are not at the points to an object."""
-    for name, values in outcome.numbers.items():
-        # As a list: Blender writes an array into the memory of the one before, whatever the length of that.
-        obj[name] = values.tolist()
 
 
 def operator_of(tool, *mixins):
