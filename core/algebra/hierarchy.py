@@ -105,8 +105,9 @@ def build_levels(
     while matrix.shape[0] > least:
         n, diagonal, rows = matrix.shape[0], matrix.diagonal(), Rows(matrix, pool, report)
         highest, own = diagonal.max(), 1.0 if mass is None else mass.diagonal()
-        # The diagonal of an unknown that is a whole component is rounding error: like those below `low`, it couples
-        # with no other.
+        # The diagonal of an unknown that is a whole component is rounding error. Like those below `low`, it couples with
+        # no other; the smoother takes these, too, but does not divide by less than `low`.
+        smooth = np.where(diagonal > _ROUNDING * highest, np.maximum(diagonal, low * own), np.inf)
         diagonal[diagonal <= np.maximum(_ROUNDING * highest, low * own)] = np.inf
         for share in STRONG:
             part = aggregates(rows, diagonal, share, report)[0]
@@ -116,6 +117,7 @@ def build_levels(
         if 2 * len(norm) > n:
             break
         top = rough_largest_eigenvalue(rows, diagonal)
+        smooth *= np.maximum(_locally_largest(rows, smooth) / top, 1.0)
         plain = sparse.csr_array((slowest / norm[part], part, np.arange(n + 1)), shape=(n, len(norm)))
         prolongation = (plain - sparse.diags_array(4.0 / 3.0 / top / diagonal) @ (rows @ plain)).tocsr()
         restriction = prolongation.T.tocsr()
@@ -126,7 +128,7 @@ def build_levels(
                 rough=Rows(_single(matrix), pool, report),
                 mass=mass,
                 top=top * highest,
-                steps=[step[:, None].astype(np.float32) for step in smoothing_steps(top, diagonal)],
+                steps=[step[:, None].astype(np.float32) for step in smoothing_steps(top, smooth)],
                 prolongation=Rows(prolongation, pool, report),
                 extension=Rows(_single(prolongation), pool, report),
                 restriction=Rows(_single(restriction), pool, report),
@@ -136,6 +138,21 @@ def build_levels(
         mass = back @ (prolongation if mass is None else mass @ prolongation)
         slowest = norm
     return levels, matrix, mass
+
+
+def _locally_largest(matrix: Rows, diagonal: Floats) -> Floats:
+    """Return about the largest eigenvalue over the diagonal of each unknown with those that it couples with, (n,).
+
+    Of few that hardly couple with others, such as a pair, it is up to two. Among many a random start does not find it,
+    and with steps for the estimate of all the smoother would leave the error of these few as it is.
+    """
+    root = 1.0 / np.sqrt(diagonal)
+
+    def measure(rows: slice, part: sparse.csr_array) -> Floats:
+        squares = np.add.reduceat((part.data * root[part.indices]) ** 2, part.indptr[:-1]) * root[rows] ** 2
+        return 1.0 + np.sqrt(np.maximum(squares - 1.0, 0.0))
+
+    return np.concatenate(list(matrix.each(measure)))
 
 
 def _single(matrix: sparse.csr_array) -> sparse.csr_array:

@@ -5,16 +5,17 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 from scipy import sparse
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import eigsh, splu
 from scipy.spatial import cKDTree
 
 import core
 from benchmarks.samplings import random_sphere
-from core.algebra import coarse_to_fine, solvers
+from core.algebra import coarse_to_fine, hierarchy, solvers
 from core.algebra.hierarchy import approximate_inverse
 from core.algebra.rows import Rows
 from core.algebra.solvers import conjugate_gradients, solve_symmetric
 
+PAIRS = [(k, j) for k in range(2) for j in range(3)]
 CLOUDS = ["another random sphere", "coarse torus", "random square", "density jump"]
 
 
@@ -206,3 +207,39 @@ def test_a_product_is_changed_part_by_part(monkeypatch):
     with ThreadPoolExecutor(2) as pool:
         found = Rows(matrix, pool, silent).product(other, subtract)
     np.testing.assert_allclose(found, load - matrix @ other, atol=1e-14)
+
+
+def attached(extra, links):
+    """Smooth matrix of a random sphere, with few more unknowns that hardly couple with it."""
+    points = random_sphere(6000)
+    matrix = kernel_matrix(points, 0.12)
+    matrix /= matrix.diagonal().mean()
+    whole = sparse.block_array([[matrix, None], [None, sparse.csr_array(extra)]]).tolil()
+    for own, other, weight in links:
+        own += len(points)
+        whole[own, other] = whole[other, own] = -weight
+        whole[own, own] += weight
+        whole[other, other] += weight
+    return whole.tocsr()
+
+
+class TestPointsThatHardlyCouple:
+    """Few points that lie nearly apart from all others, as scans of depth cameras have them."""
+
+    def check(self, matrix, mass, scale):
+        root = 1.0 / np.sqrt(mass)
+        scaled = (sparse.diags_array(root) @ matrix @ sparse.diags_array(root)).tocsr()
+        found = coarse_to_fine(scaled, 1.0 / root, 20, 2e-7, scale, lambda *_: None)
+        assert found is not None
+        exact = np.sort(eigsh(scaled, 20, sigma=-1e-4, return_eigenvectors=False))
+        np.testing.assert_allclose(found[0][1:], exact[1:], rtol=1e-6)
+
+    def test_a_pair_whose_largest_eigenvalue_is_not_seen_among_many(self, monkeypatch):
+        monkeypatch.setattr(hierarchy, "rough_largest_eigenvalue", lambda *_: 1.54)  # as of 240,000 points
+        matrix = attached(0.3 * np.array([[1.0, -1.0], [-1.0, 1.0]]), [(k, 7 + k + 5 * j, 1e-4) for k, j in PAIRS])
+        self.check(matrix, np.append(np.ones(6000), [1.0, 5.0]), 0.0)
+
+    def test_many_of_large_areas(self):
+        ring = sparse.eye_array(100) - sparse.csr_array(np.roll(np.eye(100), 1, axis=1))
+        links = [(own, 50 * own + j, 0.03) for own in range(100) for j in range(3)]
+        self.check(attached(0.009 * (ring.T @ ring), links), np.append(np.ones(6000), np.full(100, 3.0)), 0.1)
