@@ -13,7 +13,7 @@ def _modules():
     if not missing.scipy_serves():
         return (missing,)
     from .operators import rigging, tools
-    from .operators.deform import bake, handle_kind, live
+    from .operators.deform import bake, deleted, handle_kind, live
     from .operators.deform import tools as deform
     from .operators.files import command, exporting, importing, tiles
     from .operators.objects import counting, motion, motion_files, notices, settings
@@ -51,6 +51,7 @@ def _modules():
         deform,
         bake,
         live,
+        deleted,
         *_within(rigging),
         importing,
         tiles,
