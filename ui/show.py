@@ -14,10 +14,10 @@ from ..operators.objects.colors import is_color, own_colors, own_material
 from ..operators.objects.groups import handle_names, has_group
 from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set_input
-from ..operators.objects.reading import TYPES, fingerprint, sharing_objects, spacing
+from ..operators.objects.reading import TYPES, sharing_objects, spacing
 from ..operators.objects.splats import has_splats
 from ..tools.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, HIGH, LOW, ROLES
-from ..tools.quantities import MEAN_CURVATURE, quantity
+from ..tools.quantities import MEAN_CURVATURE, STRAY, quantity
 from . import colormaps, legend, smooth, solid
 from .display import (
     NAME,
@@ -63,6 +63,8 @@ def show_attribute(obj, name: str = "", radius: float = 0.0):
     """Show an attribute as colours on the points, by the display settings of the object.
 
     Parameters
+_SURFACE, _OWN = "<surface>", "<material>"  # what is shown that is no attribute
+_previewed = set()  # views that were in Solid before something was shown that passes, by their pointers
     ----------
     obj : bpy.types.Object
         A mesh object.
@@ -149,11 +151,7 @@ def show_groups(obj):
     modifier, material = find_display(obj), find_material(obj)
     plain = material is not None and is_plain(material)
     if plain and not obj.meshfree.show_groups:
-        set_input(modifier, "Material", None)  # Blender 5.2 would go on counting it as used
-        if DISC not in obj.data.attributes:  # else it shows the surface
-            obj.modifiers.remove(modifier)
-        _remove_unused(material)
-        reshape(obj)
+        _uncolor(obj, DISC in obj.data.attributes)
     elif obj.meshfree.show_groups and (modifier is None or get_input(modifier, "Material") is None):
         _add_display(obj)
         resize(obj)
@@ -165,7 +163,20 @@ def show_groups(obj):
         obj.update_tag()
     recolor(obj)
     if obj.meshfree.show_groups:
-        use_material_preview(bpy.context)
+        _previewed.update(_to_preview(bpy.context))
+    else:
+        _leave_preview()
+
+
+def _uncolor(obj, surface):
+    """Show no colors any more: the surface alone, or nothing."""
+    modifier, material = find_display(obj), find_material(obj)
+    set_input(modifier, "Material", None)  # Blender 5.2 would go on counting it as used
+    if not surface:
+        obj.modifiers.remove(modifier)
+    if material is not None:
+        _remove_unused(material)
+    reshape(obj)
 
 
 @persistent
@@ -187,13 +198,42 @@ def _keep_groups(*_):
 def show_result(obj, name):
     """Show a new result; without a name the displayed attribute, or the mean curvature."""
     show_attribute(obj, MEAN_CURVATURE if not name and is_colored(obj) else name)
-    look_at([obj])
+    look_at([obj], passing)
+
+
+def _looks(obj) -> str:
+    """Return what an object shows: an attribute, its own material, the surface alone, or nothing."""
+    modifier = find_display(obj)
+    if modifier is None:
+        return ""
+    own = own_material(obj)
+    return shown_attribute(obj) or (_OWN if own is not None and get_input(modifier, "Material") == own else _SURFACE)
+
+
+def show_former(obj):
+    """Show what an object showed before its stray points, which are gone."""
+    if shown_attribute(obj) != STRAY:
+        return
+    former = obj.meshfree.shown_before
+    if former in obj.data.attributes:
+        show_attribute(obj, former)
+    elif former == _OWN and own_material(obj) is not None:
+        show_own_material(obj)
+    elif has_splats(obj.data):
+        show_splats(obj)
+    else:
+        _uncolor(obj, former != "")
+        show_groups(obj)
+    _leave_preview()
 
 
 def show_sequence(objects, name):
     """Show an attribute of several objects by one colour map and in one range, which is locked, for all of them."""
     first = objects[0].meshfree
     values = np.concatenate([read_attribute(obj.data, name) for obj in objects])
+    passing = name == STRAY
+    if passing and shown_attribute(obj) != STRAY:
+        obj.meshfree.shown_before = _looks(obj)
     mode = "AUTO" if first.range_mode == "LOCKED" else first.range_mode
     chosen = "LIDAR" if first.color_map == "AUTO" and _are_lidar_classes(name, values) else first.color_map
     color_map, low, high = fit_range(values, chosen, mode, first.coverage)
@@ -301,8 +341,11 @@ def show_in_solid(obj):
                 shading.type = "MATERIAL"
 
 
-def look_at(objects):
-    """Let the active viewport show the display of objects: without a GPU in Solid, if possible."""
+def look_at(objects, passing=False):
+    """Let the active viewport show the display of objects: without a GPU in Solid, if possible.
+
+    Of a passing one it is known where to return to, see `_leave_preview`.
+    """
     if _without_card() and all(is_in_solid(obj) for obj in objects):
         for obj in objects:
             show_in_solid(obj)
@@ -311,7 +354,13 @@ def look_at(objects):
 
 
 def use_material_preview(context):
-    """Switch the active viewport from Solid, where points are gray, to Material Preview.
+    """Switch the active viewport from Solid, where points are gray, to Material Preview, for good."""
+    _to_preview(context)
+    _previewed.clear()
+
+
+def _to_preview(context) -> set:
+    """Switch the active viewport from Solid to Material Preview, and return the pointers of those that were switched.
 
     From the Properties editor, which has some of our panels, switch all viewports of the screen.
     """
@@ -319,16 +368,30 @@ def use_material_preview(context):
     if space is None or context.scene.render.engine == "BLENDER_WORKBENCH":  # which has none
         return
     spaces = [area.spaces.active for area in context.screen.areas] if space.type == "PROPERTIES" else [space]
-    for view in spaces:
-        if view.type == "VIEW_3D" and view.shading.type == "SOLID":
-            view.shading.type = "MATERIAL"
+    switched = [view for view in spaces if view.type == "VIEW_3D" and view.shading.type == "SOLID"]
+    for view in switched:
+        view.shading.type = "MATERIAL"
+    return {view.as_pointer() for view in switched}
+
+
+def _leave_preview():
+    """Switch viewports back to Solid that were in it, once no object shows groups any more."""
+    if any(obj.meshfree.show_groups for obj in bpy.context.view_layer.objects):
+        return
+    for area in _views():
+        view = area.spaces.active
+        if view.as_pointer() in _previewed and view.shading.type == "MATERIAL":
+            view.shading.type = "SOLID"
+    _previewed.clear()
 
 
 def resize(obj):
     """Set the size of the points by the settings, in units of their spacing."""
     modifier = find_display(obj)
+    elif passing:
+        _previewed.update(_to_preview(bpy.context))
     if modifier is None:
-        return
+        return set()
     _measure(obj)
     set_input(modifier, "Radius", _radius(obj.meshfree))
     reshape(obj)
@@ -531,3 +594,4 @@ def attach():
 def detach():
     """Remove the handlers."""
     remove_handlers(_HANDLERS)
+    "strays_gone": show_former,

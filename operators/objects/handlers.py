@@ -12,6 +12,7 @@ _OWN = {
     "colors_found": [],  # (objects) to be shown in their own colors, by one material: ui/show.py
     "splats_found": [],  # (obj) whose splats are to be shown: ui/show.py
     "result_written": [],  # (obj, name of the attribute to show, empty for the one on show): ui/show.py
+    "strays_gone": [],  # (obj) that showed them: ui/show.py
     "mesh_made": [],  # (obj, the new object of its mesh, to be shown like it): ui/show.py
     "frame_shown": [],  # (obj) of a motion: ui/show.py
     "sequence_written": [],  # (objects, name of the attribute to show in one range): ui/show.py

@@ -266,6 +266,9 @@ class MESHFREE_PG_settings(with_properties(LAPLACIAN.values()), bpy.types.Proper
         description="Material of the first slot that the display shows and follows",
     )
     profile: PointerProperty(type=bpy.types.Text, name="Profile", description="Text with the table of the last profile")
+    shown_before: StringProperty(
+        name="Shown Before", description="What was shown before stray points were; empty for no display"
+    )
     slopes_of: StringProperty(name="Slopes of", description="What is shown with slopes, and its checksum")
     spacing_of: StringProperty(name="Spacing of", description="Checksum of the points whose spacing was measured")
     colors_behind: BoolProperty(

@@ -11,6 +11,7 @@ from ...tools.quantities import COMPONENT, STRAY, quantity
 from ...tools.settings import Choice, by_name
 from ..objects.attributes import read_attribute, tag_changed
 from ..objects.deleting import check_deletable, keep_points
+from ..objects.handlers import notify
 from ..objects.properties import property_of, values_of, with_properties
 from ..objects.reading import read_points
 from ..objects.result import EIGENVALUES, is_analyzed, is_stale
@@ -113,7 +114,15 @@ class StrayActions(StraySettings):
             obj.data.vertices.foreach_set("select", selection(obj) & ~found)
             tag_changed(obj.data)
             return ", hidden in Edit Mode"
-        return f', in "{_separate(context, obj, found)}"' if self.action == "SEPARATE" else ""
+        if self.action == "SHOW":
+            return ""
+        parts, text = [obj], ""
+        if self.action == "SEPARATE":
+            parts.append(_separate(context, obj, found))
+            text = f', in "{parts[-1].name}"'
+        for part in parts:
+            notify("strays_gone", part)
+        return text
 
     def conclude(self, context, objects):
         if self.action == "SHOW":
@@ -121,7 +130,7 @@ class StrayActions(StraySettings):
 
 
 def _separate(context, obj, found):
-    """Move points, (n,) bool, to an object of their own, and return its name."""
+    """Move points, (n,) bool, to an object of their own, and return it."""
     part = obj.copy()
     part.name = f"{obj.name} Stray"
     part.data = obj.data.copy()
@@ -131,7 +140,7 @@ def _separate(context, obj, found):
         collection.objects.link(part)
     keep_points(context, part, found)
     keep_points(context, obj, ~found)
-    return part.name
+    return part
 
 
 class MESHFREE_OT_select_strays(SelectionOperator, StraySettings, bpy.types.Operator):

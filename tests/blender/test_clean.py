@@ -8,6 +8,7 @@ import pytest
 
 import core
 from tests.blender.clouds import add_group, add_object, attribute, local_points, sphere_points
+from tests.blender.conftest import part
 from tests.blender.splats import add_splats, bar_splats
 
 SPHERE = sphere_points(600)
@@ -102,6 +103,45 @@ def test_buttons_act_on_what_is_shown():
     obj.data.attributes.new("lb_stray", "BOOLEAN", "POINT").data.foreach_set("value", np.arange(611) < 50)
     bpy.ops.meshfree.stray_points(action="DELETE", as_shown=True)
     np.testing.assert_array_equal(attribute(obj, "number"), np.arange(50, 611))
+
+
+def shown(obj):
+    """What the display of an object shows."""
+    display = part("ui.display")
+    modifier = display.find_display(obj)
+    material = modifier and part("operators.objects.modifiers").get_input(modifier, "Material")
+    return modifier is not None, display.shown_attribute(obj), material and material.name
+
+
+def show_own(obj):
+    obj.data.materials.append(bpy.data.materials.new("Clay"))
+    bpy.ops.meshfree.show_surface()
+
+
+@pytest.mark.parametrize("action", ["DELETE", "SEPARATE"])
+@pytest.mark.parametrize(
+    "show",
+    [
+        lambda obj: None,
+        lambda obj: bpy.ops.meshfree.show_surface(),
+        lambda obj: bpy.ops.meshfree.colormap(attribute="number"),
+        show_own,
+    ],
+)
+def test_what_was_shown_before_is_shown_again_when_they_are_gone(show, action):
+    obj = add_cloud()
+    show(obj)
+    before = shown(obj)
+    bpy.ops.meshfree.stray_points()
+    bpy.ops.meshfree.stray_points()  # again
+    assert shown(obj)[1] == "lb_stray"
+    bpy.ops.meshfree.stray_points(action="SELECT", as_shown=True)
+    assert shown(obj)[1] == "lb_stray"
+    bpy.ops.meshfree.stray_points(action=action, as_shown=True)
+    for each in bpy.data.objects:
+        assert shown(each)[:2] == before[:2]
+    if before[2] in {None, "Clay"}:
+        assert shown(obj) == before
 
 
 def test_undo_takes_it_back():
