@@ -9,6 +9,7 @@ from .settings import Choice, Setting
 from .tool import Array, Length, Outcome, PointTool, Progress, Row
 
 _SPACINGS = 2.0  # of the points, between those that stay, where none is given
+SHARE = 4  # one in so many stays where no number is given
 
 
 class ThinOut(PointTool):
@@ -34,11 +35,19 @@ class ThinOut(PointTool):
             form="LENGTH",
             at_zero="Automatic",
         ),
-        Setting("count", "How many points stay at most, for Number", 10_000, 1, label="Number", high=1_000_000),
+        Setting(
+            "count",
+            "How many points stay at most, for Number; 0 for a quarter of them",
+            0,
+            0,
+            label="Number",
+            high=1_000_000,
+            at_zero="A Quarter",
+        ),
         Setting("keep_edges", "Keep points at edges before others, the sharpest first", True),
     )
     panel, menu = Row("Clean", 1, 2), Row("Object", 4, 4)
-    keeps_line = deletes = True
+    keeps_line = deletes = extended = True
 
     def adjustable(self, own: Any) -> tuple[str, ...]:
         return self.asks(own)
@@ -46,7 +55,8 @@ class ThinOut(PointTool):
     def compute(self, points: Array, inputs: Any, own: Any, progress: Progress) -> Any:
         """Return which points stay, (n,) bool, and the least distance between them, or None if that is not known."""
         least = (own.spacing or _SPACINGS * core.geometry.typical_distance(points)) or None
-        size = {"count": own.count} if own.by == "NUMBER" or least is None else {"spacing": least}
+        count = own.count or -(-len(points) // SHARE)
+        size = {"count": count} if own.by == "NUMBER" or least is None else {"spacing": least}
         kept = np.zeros(len(points), dtype=bool)
         kept[core.clean.thin_out(points, keep_edges=own.keep_edges, progress=progress, **size)] = True
         return kept, size.get("spacing")

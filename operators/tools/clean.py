@@ -6,10 +6,10 @@ from bpy.props import BoolProperty
 
 from ... import core
 from ...core import PointCloudError
-from ...tools import stray_points
+from ...tools import stray_points, thin_out
 from ...tools.quantities import COMPONENT, STRAY, quantity
 from ...tools.settings import Choice, by_name
-from ..objects.attributes import read_attribute, tag_changed
+from ..objects.attributes import point_count, read_attribute, tag_changed
 from ..objects.deleting import check_deletable, keep_points
 from ..objects.handlers import notify
 from ..objects.properties import property_of, values_of, with_properties
@@ -143,6 +143,16 @@ def _separate(context, obj, found):
     return part
 
 
+class ThinActions:
+    """What Blender adds to the tool: a number in the dialog that suits the object, unless the last one does."""
+
+    def invoke(self, context, event):
+        points = point_count(context.object.data)
+        if not 0 < self.count < points:
+            self.count = round(float(f"{points / thin_out.SHARE:.1e}"))
+        return super().invoke(context, event)
+
+
 class MESHFREE_OT_select_strays(SelectionOperator, StraySettings, bpy.types.Operator):
     """Select stray points: single ones off the surface, small floating parts, and floaters among splats"""
 
@@ -191,6 +201,7 @@ class MESHFREE_OT_select_left_out(SelectionOperator, bpy.types.Operator):
 
 TOOLS = (
     registration_of(stray_points.TOOL, StrayActions),
+    registration_of(thin_out.TOOL, ThinActions),
     Registration(MESHFREE_OT_select_strays, menu=Row("Points", 1, 7)),
     Registration(MESHFREE_OT_select_left_out, menu=Row("Points", 1, 8)),
 )

@@ -252,3 +252,9 @@ def test_thinning_by_itself_doubles_the_spacing():
     obj = add_cloud(points=SPHERE)
     bpy.ops.meshfree.thin_out()
     assert 600 / 8 < len(obj.data.vertices) < 600 / 3
+
+
+def test_thinning_by_itself_leaves_a_quarter():
+    obj = add_cloud(points=SPHERE)
+    bpy.ops.meshfree.thin_out(by="NUMBER")
+    assert len(obj.data.vertices) == 150
