@@ -17,7 +17,7 @@ def _modules():
     from .operators.deform import tools as deform
     from .operators.files import command, exporting, importing, tiles
     from .operators.objects import counting, motion, motion_files, notices, settings
-    from .operators.running import cache, job
+    from .operators.running import cache, discs, job
     from .ui import (
         applications,
         colormap,
@@ -46,6 +46,7 @@ def _modules():
         motion,
         motion_files,
         job,
+        discs,
         *_within(tools),
         handle_kind,
         deform,

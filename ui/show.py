@@ -9,13 +9,21 @@ from bpy.app.handlers import persistent
 
 from .. import core
 from ..operators.deform.nodes import find_deform, is_baked, show_live, turns_discs
-from ..operators.objects.attributes import DISC, in_edit_mesh, point_count, positions_now, read_attribute
+from ..operators.objects.attributes import (
+    DISC,
+    in_edit_mesh,
+    point_count,
+    points_checksum,
+    positions_now,
+    read_attribute,
+)
 from ..operators.objects.colors import is_color, own_colors, own_material
 from ..operators.objects.groups import handle_names, has_group
 from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set_input
 from ..operators.objects.reading import TYPES, sharing_objects, spacing
 from ..operators.objects.splats import has_splats
+from ..operators.running.discs import renew_discs
 from ..tools.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, HIGH, LOW, ROLES
 from ..tools.quantities import MEAN_CURVATURE, STRAY, quantity
 from . import colormaps, legend, smooth, solid
@@ -55,6 +63,8 @@ _LATE = LOW, HIGH  # groups of later versions
 _MOST_GROUPS = 12  # attributes of groups in a material: Blender's shaders have at most 15
 _MOST_WITHOUT_CARD = 20_000  # dots that two processors draw ten times a second, see benchmarks/frames.py
 _LINE_WIDTH = 1.0 / 250.0  # of iso lines, in the root of the area
+_SURFACE, _OWN = "<surface>", "<material>"  # what is shown that is no attribute
+_previewed = set()  # views that were in Solid before something was shown that passes, by their pointers
 _noted = {}  # Group Colors of objects in Edit Mode while something is undone, by session_uid
 _NO_SPACING = 0.01  # for points too few to have one
 
@@ -63,8 +73,6 @@ def show_attribute(obj, name: str = "", radius: float = 0.0):
     """Show an attribute as colours on the points, by the display settings of the object.
 
     Parameters
-_SURFACE, _OWN = "<surface>", "<material>"  # what is shown that is no attribute
-_previewed = set()  # views that were in Solid before something was shown that passes, by their pointers
     ----------
     obj : bpy.types.Object
         A mesh object.
@@ -197,6 +205,9 @@ def _keep_groups(*_):
 
 def show_result(obj, name):
     """Show a new result; without a name the displayed attribute, or the mean curvature."""
+    passing = name == STRAY
+    if passing and shown_attribute(obj) != STRAY:
+        obj.meshfree.shown_before = _looks(obj)
     show_attribute(obj, MEAN_CURVATURE if not name and is_colored(obj) else name)
     look_at([obj], passing)
 
@@ -231,9 +242,6 @@ def show_sequence(objects, name):
     """Show an attribute of several objects by one colour map and in one range, which is locked, for all of them."""
     first = objects[0].meshfree
     values = np.concatenate([read_attribute(obj.data, name) for obj in objects])
-    passing = name == STRAY
-    if passing and shown_attribute(obj) != STRAY:
-        obj.meshfree.shown_before = _looks(obj)
     mode = "AUTO" if first.range_mode == "LOCKED" else first.range_mode
     chosen = "LIDAR" if first.color_map == "AUTO" and _are_lidar_classes(name, values) else first.color_map
     color_map, low, high = fit_range(values, chosen, mode, first.coverage)
@@ -308,6 +316,19 @@ def _objects_changed(_scene, depsgraph):
         if isinstance(update.id, bpy.types.Object) and update.id.type in TYPES:
             follow_own_material(update.id.original)
             _catch_up(update.id.original)
+            if update.is_updated_geometry:
+                _follow_points(update.id.original)
+
+
+def _follow_points(obj):
+    """Let a display follow points that were moved, added or deleted, in whatever way: their size, and their discs."""
+    if find_display(obj) is None or find_deform(obj) is not None or obj.mode != "OBJECT" or not obj.is_editable:
+        return
+    if obj.data.is_editable and obj.meshfree.spacing_of != points_checksum(obj.data):
+        if _sized_by_hand(obj):
+            _measure(obj)
+        else:
+            resize(obj)
 
 
 def show_splats(obj):
@@ -349,6 +370,8 @@ def look_at(objects, passing=False):
     if _without_card() and all(is_in_solid(obj) for obj in objects):
         for obj in objects:
             show_in_solid(obj)
+    elif passing:
+        _previewed.update(_to_preview(bpy.context))
     else:
         use_material_preview(bpy.context)
 
@@ -366,7 +389,7 @@ def _to_preview(context) -> set:
     """
     space = context.space_data
     if space is None or context.scene.render.engine == "BLENDER_WORKBENCH":  # which has none
-        return
+        return set()
     spaces = [area.spaces.active for area in context.screen.areas] if space.type == "PROPERTIES" else [space]
     switched = [view for view in spaces if view.type == "VIEW_3D" and view.shading.type == "SOLID"]
     for view in switched:
@@ -388,22 +411,22 @@ def _leave_preview():
 def resize(obj):
     """Set the size of the points by the settings, in units of their spacing."""
     modifier = find_display(obj)
-    elif passing:
-        _previewed.update(_to_preview(bpy.context))
     if modifier is None:
-        return set()
+        return
     _measure(obj)
     set_input(modifier, "Radius", _radius(obj.meshfree))
     reshape(obj)
 
 
 def _measure(obj):
-    """Measure the spacing of the points, if they have changed."""
+    """Measure the spacing of the points, and find their discs again, if they have changed."""
     kept = obj.meshfree
     if obj.mode != "EDIT":
-        points = fingerprint(obj, glance=True)
+        points = points_checksum(obj.data)
         if kept.spacing_of != points:
+            kept.discs_of = kept.discs_of or kept.spacing_of  # which earlier versions did not know
             kept.spacing_of, kept.spacing = points, spacing(obj.data)
+            renew_discs(obj)
     elif not kept.spacing:
         kept.spacing = core.geometry.typical_distance(positions_now(obj))
 
@@ -573,6 +596,7 @@ _HANDLERS = {
     "colors_found": show_colors,
     "splats_found": show_splats,
     "result_written": show_result,
+    "strays_gone": show_former,
     "mesh_made": show_alike,
     "frame_shown": follow_frame,
     "sequence_written": show_sequence,
@@ -594,4 +618,3 @@ def attach():
 def detach():
     """Remove the handlers."""
     remove_handlers(_HANDLERS)
-    "strays_gone": show_former,

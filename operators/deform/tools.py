@@ -12,14 +12,13 @@ from ...core import PointCloudError
 from ...tools.groups import ANCHOR, HANDLE
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import (
-    DISC,
     REST,
     point_count,
     read_attribute,
     write_attribute,
     write_own_positions,
 )
-from ..objects.carried import carried, shown_moved
+from ..objects.carried import carried, shown_moved, write_discs
 from ..objects.groups import assign, check_assignable, group_weights, handle_names, has_group
 from ..objects.handlers import notify
 from ..objects.modifiers import get_input
@@ -324,7 +323,7 @@ class MESHFREE_OT_deform_apply(BoundOperator, bpy.types.Operator):
         else:
             write_own_positions(obj.data, positions)
             for values in shown_moved(obj, get_input(find_deform(obj), "Strength")).values():
-                write_attribute(obj.data, DISC, values)
+                write_discs(obj, values)
         return take(positions)
 
 

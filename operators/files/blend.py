@@ -16,7 +16,6 @@ from ...core.files import SCANNER, PointTable
 from ...core.files.table import NORMAL as FILE_NORMAL
 from ...tools.quantities import APPLICATIONS, MEAN_CURVATURE, NORMAL, ORIENTATION, RESULTS
 from ..objects.attributes import (
-    DISC,
     check_size,
     own_positions,
     remove_attributes,
@@ -141,7 +140,6 @@ class Owner:
             write_splats(data, given.deformed(own_positions(data) + moved, maps))
             return
         write_own_positions(data, own_positions(data) + moved)
-        remove_attributes(data, DISC)  # until the next analysis
 
     def _write_columns(self, columns):
         """Write columns by name, in place of those that the object has."""

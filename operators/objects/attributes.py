@@ -1,5 +1,6 @@
 """Attributes of this extension other than results, by name and type; reading and writing attributes."""
 
+import zlib
 from typing import NamedTuple
 
 import bmesh
@@ -112,6 +113,11 @@ def write_own_positions(data, positions):
     """Move the points of a mesh or a point cloud to these positions, (n, 3)."""
     data.attributes["position"].data.foreach_set("vector", positions.astype(np.float32).reshape(-1))
     tag_changed(data)
+
+
+def points_checksum(data) -> str:
+    """Return a checksum of the positions of the points of a mesh or a point cloud, without shape keys and modifiers."""
+    return f"{zlib.crc32(own_positions(data)):08x}"
 
 
 def deselect(data):

@@ -13,10 +13,12 @@ from .attributes import (
     SPLAT_ROTATION,
     SPLAT_SCALE,
     has_vectors,
+    points_checksum,
     read_attribute,
     remove_attributes,
     write_attribute,
 )
+from .reading import sharing_objects
 from .splats import HARMONIC, ROTATION, SCALE, harmonic_names, has_splats, shown_splats
 
 
@@ -61,6 +63,18 @@ def carries(obj) -> bool:
 def discs_at_rest(obj):
     """Read the discs of an object's display at rest, normals times radii, (n, 3); None without discs."""
     return read_attribute(obj.data, DISC) if carries(obj) and not has_splats(obj.data) else None
+
+
+def write_discs(obj, values):
+    """Write the discs of an object's points where they are now, (n, 3), as `DISC` holds them."""
+    write_attribute(obj.data, DISC, values)
+    for owner in (obj, *sharing_objects(obj)):
+        owner.meshfree.discs_of = points_checksum(obj.data)
+
+
+def are_discs_stale(obj) -> bool:
+    """Whether points were moved, added or deleted since their discs were found, as far as that is known."""
+    return DISC in obj.data.attributes and obj.meshfree.discs_of not in ("", points_checksum(obj.data))
 
 
 def local_gradients(gradients, matrix):

@@ -4,7 +4,7 @@ import bmesh
 import bpy
 
 from ...core import PointCloudError
-from .attributes import SELECTION, write_attribute
+from .attributes import SELECTION, tag_changed, write_attribute
 
 
 def check_deletable(obj):
@@ -19,13 +19,15 @@ def keep_points(context, obj, kept):
     """Delete the points of an object but those to keep, (n,) bool, with their data."""
     if obj.type != "MESH":
         _keep_in_cloud(context, obj, kept)
-        return
-    shape = bmesh.new()
-    shape.from_mesh(obj.data)
-    dropped = [vertex for vertex, keep in zip(shape.verts, kept, strict=True) if not keep]
-    bmesh.ops.delete(shape, geom=dropped, context="VERTS")
-    shape.to_mesh(obj.data)
-    shape.free()
+    else:
+        shape = bmesh.new()
+        shape.from_mesh(obj.data)
+        dropped = [vertex for vertex, keep in zip(shape.verts, kept, strict=True) if not keep]
+        bmesh.ops.delete(shape, geom=dropped, context="VERTS")
+        shape.to_mesh(obj.data)
+        shape.free()
+        tag_changed(obj.data)
+    context.view_layer.update()  # the display follows
 
 
 def _keep_in_cloud(context, obj, kept):

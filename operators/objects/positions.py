@@ -4,8 +4,8 @@ import numpy as np
 from bpy.props import EnumProperty
 
 from ...core import PointCloudError
-from .attributes import DISC, check_size, own_positions, read_attribute, write_attribute, write_own_positions
-from .carried import local_gradients, moved_discs
+from .attributes import DISC, check_size, own_positions, read_attribute, write_own_positions
+from .carried import local_gradients, moved_discs, write_discs
 from .modifiers import is_own
 from .reading import key_positions, shape_keys
 from .splats import has_splats, read_splats, write_splats
@@ -81,13 +81,14 @@ def write_positions(obj, reading, points, target: str, name: str, gradients=None
             write_splats(obj.data, read_splats(obj.data).deformed(own_positions(obj.data) + moved, local))
             return None
         discs = moved_discs(read_attribute(obj.data, DISC), local)
-    if discs is not None:
-        write_attribute(obj.data, DISC, discs)
+    key = None
     if target == "IN_PLACE" or obj.type != "MESH":
         write_own_positions(obj.data, own_positions(obj.data) + moved)
-        return None
-    key = add_key(obj, name, moved)
-    key.value = 1.0
+    else:
+        key = add_key(obj, name, moved)
+        key.value = 1.0
+    if discs is not None:
+        write_discs(obj, discs)
     return key
 
 

@@ -271,6 +271,7 @@ class MESHFREE_PG_settings(with_properties(LAPLACIAN.values()), bpy.types.Proper
     )
     slopes_of: StringProperty(name="Slopes of", description="What is shown with slopes, and its checksum")
     spacing_of: StringProperty(name="Spacing of", description="Checksum of the points whose spacing was measured")
+    discs_of: StringProperty(name="Discs of", description="Checksum of the points whose discs were found")
     colors_behind: BoolProperty(
         name="Colors Behind",
         description="Whether colors for Solid are outdated, since Edit Mode prevents writing them",

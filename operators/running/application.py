@@ -5,7 +5,8 @@ from bpy.props import BoolProperty
 from ...command.analysis import Built
 from ...command.naming import naming
 from ..objects.all_or_nothing import all_or_nothing
-from ..objects.attributes import DISC, write_attribute
+from ..objects.attributes import DISC
+from ..objects.carried import write_discs
 from ..objects.colors import own_material, shows_own_material
 from ..objects.handlers import notify
 from ..objects.options import laplacian_options
@@ -149,9 +150,7 @@ def _write_discs(context, obj):
     if DISC in obj.vertex_groups or not cache.holds(reading.points, options, reading.boundary, reading.splats):
         return
     laplacian = build_operator(reading, options, lambda *_: None).laplacian
-    write_attribute(
-        obj.data, DISC, discs(reading.local_normals(laplacian.normals), laplacian.disc_radii, reading.points)
-    )
+    write_discs(obj, discs(reading.local_normals(laplacian.normals), laplacian.disc_radii, reading.points))
 
 
 def compute_all(plans, progress):

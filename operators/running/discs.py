@@ -1,11 +1,38 @@
-"""The discs of the display after a tool has moved the points."""
+"""The discs of the display after points were moved, added or deleted."""
 
+from typing import NamedTuple
+
+import bpy
 import numpy as np
+from bpy.app.handlers import persistent
 
 from ... import core
-from ..objects.carried import discs_at_rest
-from ..objects.reading import discs
+from ...core import PointCloudError
+from ..objects.attributes import (
+    DISC,
+    own_positions,
+    points_checksum,
+    read_attribute,
+    remove_attributes,
+)
+from ..objects.carried import are_discs_stale, discs_at_rest, write_discs
+from ..objects.handlers import add_handlers, notify, remove_handlers
+from ..objects.reading import discs, find_object
 from . import cache
+from .job import Job
+
+_AT_ONCE = 20_000  # points whose discs a window waits for
+_TICK = 0.1  # seconds between two looks at threads
+
+
+class _Work(NamedTuple):
+    """A search for discs: the checksum of the points, and its job."""
+
+    points: str
+    job: Job
+
+
+_threads = {}  # work by the session_uid of its object
 
 
 def disc_finder(obj):
@@ -20,11 +47,76 @@ def disc_finder(obj):
     def find(reading, full, points):
         if rest is None:
             return None
-        local = reading.local(full)
-        found = cache.fetch(cache.content("discs", local), lambda: core.surface.surface_discs(local))
-        moved = discs(core.geometry.toward(found.normals, rest), found.radii, local)
+        moved = _found(reading.local(full), rest)
         steps = [np.linalg.norm(places - reading.points, axis=1) for places in (points, full)]
-        share = np.divide(*steps, out=np.zeros(len(local)), where=steps[1] > 0.0)
+        share = np.divide(*steps, out=np.zeros(len(rest)), where=steps[1] > 0.0)
         return rest + np.minimum(share, 1.0)[:, None] * (moved - rest)
 
     return find
+
+
+def _found(local, sides, progress=None):
+    """Find the discs of points in local space, on the sides of vectors, both (n, 3); see `DISC`."""
+    key = cache.content("discs", local)
+    found = cache.fetch(key, lambda: core.surface.surface_discs(local, progress=progress))
+    return discs(core.geometry.toward(found.normals, sides), found.radii, local)
+
+
+def renew_discs(obj):
+    """Find the discs of an object's display again if its points were moved, added or deleted; of many in a thread.
+
+    Sides stay. Where points have no tangent planes any more they become dots.
+    """
+    if not are_discs_stale(obj):
+        return
+    data = obj.data
+    local, sides = own_positions(data).astype(np.float64), read_attribute(data, DISC).astype(np.float64)
+    work = _Work(points_checksum(data), Job("Discs", [], lambda progress: _found(local, sides, progress)))
+    if bpy.app.background or len(local) <= _AT_ONCE:
+        work.job.wait(None)
+        _take(obj, work)
+        return
+    if obj.session_uid in _threads:
+        _threads[obj.session_uid].job.stop()
+    _threads[obj.session_uid] = work
+    if not bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.register(_tick, first_interval=_TICK)
+
+
+def _take(obj, work):
+    """Write the discs that were found, unless the points have changed since."""
+    if obj is None or obj.mode != "OBJECT" or points_checksum(obj.data) != work.points:
+        return
+    try:
+        write_discs(obj, work.job.result())
+    except PointCloudError:  # such as of a line, or of too few
+        remove_attributes(obj.data, DISC)
+    notify("shape_changed", obj)
+
+
+def _tick():
+    """Take what threads have found; a timer of the window."""
+    for uid, work in [*_threads.items()]:
+        if work.job.ended:
+            del _threads[uid]
+            _take(find_object(uid), work)
+    return _TICK if _threads else None
+
+
+@persistent
+def _forget(*_):
+    while _threads:
+        _threads.popitem()[1].job.stop()
+
+
+def attach():
+    """Drop what threads find when another file is opened."""
+    add_handlers({"load_pre": _forget})
+
+
+def detach():
+    """Stop threads and timer."""
+    remove_handlers({"load_pre": _forget})
+    _forget()
+    if bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.unregister(_tick)

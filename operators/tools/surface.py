@@ -3,7 +3,8 @@
 import bpy
 
 from ... import core
-from ..objects.attributes import DISC, tag_changed, write_attribute
+from ..objects.attributes import DISC, tag_changed
+from ..objects.carried import write_discs
 from ..objects.handlers import notify
 from ..objects.reading import chosen_sides, discs, read_points
 from ..registration import Registration, Row
@@ -33,7 +34,7 @@ class MESHFREE_OT_show_surface(ApplicationOperator, bpy.types.Operator):
         return compute
 
     def write(self, context, obj, result):
-        write_attribute(obj.data, DISC, result)
+        write_discs(obj, result)
         obj.meshfree.point_shape = "DISCS"
         tag_changed(obj.data)
         return [f"{obj.name}: {len(result):,} points are shown as discs"]

@@ -8,6 +8,7 @@ from mathutils.bvhtree import BVHTree
 from numpy.testing import assert_allclose
 
 from tests.blender.clouds import CORNERS, add_group, add_object, attribute, local_points, sphere_points
+from tests.blender.conftest import part
 from tests.blender.test_display import rendered
 from tests.blender.test_seeing import add_camera
 
@@ -94,6 +95,111 @@ def test_a_point_that_was_added_since_is_still_seen(obj):
     obj.data.vertices[600].co = 3.0, 0.0, 0.0
     obj.data.update()
     assert np.linalg.norm(drawn(obj)[600] - [3.0, 0.0, 0.0], axis=1).max() > 0.01
+
+
+def disc_sizes_of_core(obj, core):
+    return 1.1 * core.surface.surface_discs(local_points(obj)).radii / np.cos(np.pi / 6.0)
+
+
+def thin(obj):
+    bpy.ops.meshfree.thin_out()
+
+
+def delete_strays(obj):
+    bpy.ops.meshfree.stray_points(action="DELETE")
+
+
+def separate_strays(obj):
+    bpy.ops.meshfree.stray_points(action="SEPARATE")
+
+
+def edit(*work):
+    """Do something to all points in Edit Mode, by operators of Blender."""
+
+    def done(obj):
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.mesh.select_all(action="SELECT")
+        for each in work:
+            each()
+        bpy.ops.object.mode_set(mode="OBJECT")
+
+    return done
+
+
+def join(obj):
+    other = add_object(sphere_points(900, seed=4) * 0.5 + (3.0, 0.0, 0.0), "Other")
+    bpy.context.view_layer.objects.active = obj
+    other.select_set(True)
+    bpy.ops.object.join()
+
+
+def join_and_split(obj):
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_random(ratio=0.7)
+    bpy.ops.mesh.separate(type="SELECTED")
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        thin,
+        delete_strays,
+        separate_strays,
+        edit(lambda: bpy.ops.mesh.remove_doubles(threshold=0.1)),
+        edit(lambda: bpy.ops.mesh.select_random(ratio=0.6), lambda: bpy.ops.mesh.delete(type="VERT")),
+        edit(lambda: bpy.ops.transform.resize(value=(2.0, 2.0, 0.5))),
+        join,
+        join_and_split,
+    ],
+)
+def test_discs_follow_points_that_come_go_or_move(core, change):
+    obj = add_object(np.concatenate([sphere_points(1500), [[0.0, 0.0, 1.6], [0.0, 1.7, 0.0]]]))
+    obj.select_set(True)
+    bpy.ops.meshfree.show_surface()
+    points = local_points(obj)
+    change(obj)
+    bpy.context.view_layer.update()
+    assert points.shape != local_points(obj).shape or not np.allclose(points, local_points(obj))
+    for each in bpy.data.objects:
+        if "lb_disc" in each.data.attributes:
+            assert_allclose(sizes(each), disc_sizes_of_core(each, core), rtol=2e-3)
+
+
+@pytest.mark.skipif(bpy.app.version < (4, 5), reason="meshes become point clouds from Blender 4.5 on")
+def test_discs_of_point_clouds_follow_too(obj, core):
+    bpy.ops.meshfree.show_surface()
+    bpy.ops.meshfree.convert()
+    bpy.ops.meshfree.thin_out()
+    found = core.surface.surface_discs(local_points(obj))
+    radii = np.linalg.norm(attribute(obj, "lb_disc"), axis=1)
+    assert_allclose(radii * core.geometry.typical_distance(local_points(obj)), found.radii, rtol=1e-3)
+
+
+def test_discs_keep_their_sides_when_points_go(obj):
+    bpy.ops.meshfree.show_surface()
+    part("operators.objects.carried").write_discs(obj, -attribute(obj, "lb_disc"))
+    bpy.ops.meshfree.thin_out()
+    assert (np.einsum("ij,ij->i", attribute(obj, "lb_disc"), local_points(obj)) < 0.0).all()
+
+
+def test_points_that_are_no_surface_any_more_become_dots(obj):
+    bpy.ops.meshfree.show_surface()
+    bpy.ops.meshfree.thin_out(by="NUMBER", count=3)
+    assert "lb_disc" not in obj.data.attributes
+    assert len(obj.data.vertices) == 3
+
+
+def test_dots_grow_when_points_go(obj):
+    bpy.ops.meshfree.colormap(attribute="position")
+    modifiers = part("operators.objects.modifiers")
+    [display] = obj.modifiers
+    before = modifiers.get_input(display, "Radius")
+    bpy.ops.meshfree.thin_out()
+    assert 1.5 * before < modifiers.get_input(display, "Radius") < 3.0 * before
+    modifiers.set_input(display, "Radius", 0.5)
+    bpy.ops.meshfree.thin_out()
+    assert modifiers.get_input(display, "Radius") == 0.5
 
 
 @pytest.mark.skipif(bpy.app.version < (4, 5), reason="meshes become point clouds from Blender 4.5 on")
