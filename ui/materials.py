@@ -13,7 +13,11 @@ ATTRIBUTE, RANGE, COLORS = "Attribute", "Range", "Colors"  # nodes of the materi
 LINES, BELOW, ABOVE, GRAY = "Iso Lines", "Below", "Above", "Gray"  # and such that only get other values
 BACK = "Back Side"  # another: how dark what is seen from behind is
 EVEN = "Even Lines"  # another: how wide a line is by the slope
-LIT = "Unlit"  # another: how much of the color is flat
+LIT = "Unlit"  # another: how much of the light is no light of the scene
+FORM = "Form"  # another: how much that shows the form
+_LIGHT = (-0.36, 0.36, -0.86)  # where it comes from, as the camera sees it: left, above, and behind the camera
+_FALL = 3.0  # the power of that brightness
+_DARKEST = 0.08  # how bright what faces away from it is
 _INK = (0.012, 0.012, 0.016, 1.0)  # color of strokes
 _INK_TAG = "meshfree_strokes"  # custom property of the material of strokes
 _KIND = "meshfree_kind"  # custom property of the material: which nodes it has
@@ -48,7 +52,7 @@ def color_plain(material, groups):
     if (
         material.get(_KIND) != kind
         or material.node_tree is None
-        or not {BACK, LIT} <= set(material.node_tree.nodes.keys())
+        or not {BACK, FORM, LIT} <= set(material.node_tree.nodes.keys())
     ):
         tree = new_tree(material)
         gray = tree.node("ShaderNodeRGB")
@@ -78,8 +82,10 @@ def color_splats(material):
 
 
 def shade(material, lit):
-    """Let a material show how the surface is lit, from not at all at 0 to nothing but that at 1."""
-    material.node_tree.nodes[LIT].inputs[0].default_value = 1.0 - lit
+    """Let a material show the form: not at all at 0, by a light beside the camera at 0.5, by the scene's alone at 1."""
+    nodes = material.node_tree.nodes
+    nodes[FORM].inputs[1].default_value = min(2.0 * lit, 1.0)
+    nodes[LIT].inputs[0].default_value = min(2.0 - 2.0 * lit, 1.0)
 
 
 def dim_back(material, dimmed):
@@ -176,7 +182,7 @@ def _begin(material, name, kind, needed=()):
     So it is where its nodes were of another kind, or somebody has deleted one that is needed.
     """
     tree = None
-    if material.get(_KIND) != kind or not {ATTRIBUTE, BACK, LIT, *needed} <= set(material.node_tree.nodes.keys()):
+    if material.get(_KIND) != kind or not {ATTRIBUTE, BACK, FORM, LIT, *needed} <= set(material.node_tree.nodes.keys()):
         tree = new_tree(material)
         tree.node("ShaderNodeAttribute", name=ATTRIBUTE)
         material[_KIND] = kind
@@ -218,19 +224,32 @@ def _build_number_tree(tree, component, repeated, hiding, groups):
 def _shine(tree, color, groups, hidden=None):
     """Give the surface a colour, and points of groups theirs; nothing is seen where a number, if there is one, is 1.
 
-    By emission, so that colours read as in the legend, and by diffuse light, so that shapes show: see `shade` for their
-    shares, and `dim_back` for the back side.
+    By emission, as if lit beside the camera, so that colors and form are seen in every scene, and by the lights of the
+    scene: see `shade` for their shares, and `dim_back` for the back side.
     """
     for name, group_color in groups.items():
         weight = tree.node("ShaderNodeAttribute", attribute_name=name, name=f"Group {name}")
         color = _mix(tree, tree.math("GREATER_THAN", weight.outputs["Fac"], 0.0), color, group_color)
     seen = tree.node("ShaderNodeNewGeometry").outputs
     color = _mix(tree, tree.math("MULTIPLY", seen["Backfacing"], 0.0, name=BACK), color, BEYOND)
-    diffuse = tree.node("ShaderNodeBsdfDiffuse", color, Normal=_disc_normal(tree, seen))
-    mixed = tree.node("ShaderNodeMixShader", None, diffuse, tree.node("ShaderNodeEmission", color), name=LIT)
+    normal = _disc_normal(tree, seen)
+    form = tree.math("MULTIPLY", tree.math("SUBTRACT", _brightness(tree, normal), 1.0), name=FORM)
+    light = tree.node("ShaderNodeEmission", color, tree.math("ADD", form, 1.0))
+    mixed = tree.node(
+        "ShaderNodeMixShader", None, tree.node("ShaderNodeBsdfDiffuse", color, Normal=normal), light, name=LIT
+    )
     if hidden is not None:
         mixed = tree.node("ShaderNodeMixShader", hidden, mixed, tree.node("ShaderNodeBsdfTransparent"))
     tree.output("ShaderNodeOutputMaterial", mixed)
+
+
+def _brightness(tree, normal):
+    """Add the nodes for how bright a surface is in a light beside the camera, which reaches around it; return that."""
+    facing = tree.node(
+        "ShaderNodeVectorTransform", normal, vector_type="NORMAL", convert_from="WORLD", convert_to="CAMERA"
+    )
+    around = tree.math("MULTIPLY_ADD", tree.vector("DOT_PRODUCT", facing, _LIGHT), 0.5, 0.5)
+    return tree.math("MULTIPLY_ADD", tree.math("POWER", around, _FALL), 1.0 - _DARKEST, _DARKEST)
 
 
 def _disc_normal(tree, seen):

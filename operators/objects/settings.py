@@ -180,9 +180,9 @@ class MESHFREE_PG_settings(with_properties(LAPLACIAN.values()), bpy.types.Proper
     )
     shaded: FloatProperty(
         name="Shaded",
-        description="Strength of shading: 0 flat colors, 1 fully shaded. In Material Preview and renders; Solid has"
-        " shading of its own",
-        default=0.4,
+        description="How the form is seen in Material Preview and renders: 0 flat colors, as in the legend; 0.5 as if"
+        " lit beside the camera, whatever the lights; 1 by the lights of the scene alone. Solid has shading of its own",
+        default=0.5,
         min=0.0,
         max=1.0,
         subtype="FACTOR",

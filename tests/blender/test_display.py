@@ -398,6 +398,7 @@ def test_iso_lines_lie_inside_the_range(obj, tmp_path):
     values = obj.data.attributes.new("ends", "FLOAT", "POINT")
     values.data.foreach_set("value", np.where(height > 0.0, 1.0, 0.0).astype(np.float32))
     obj.data.attributes.new("height", "FLOAT", "POINT").data.foreach_set("value", height)
+    obj.meshfree.shaded = 0.0
     bpy.ops.meshfree.colormap(attribute="ends", radius=0.1)
     assert dark_share(tmp_path / "plain.png") == 0.0
     obj.meshfree.iso_lines = 5

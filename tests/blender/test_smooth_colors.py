@@ -241,11 +241,41 @@ def test_the_share_of_light_is_a_setting(obj, tmp_path):
     flat = rendered(tmp_path / "flat.png")
     assert flat.std(axis=0).max() < 0.02
     obj.meshfree.shaded = 1.0
+    dark = rendered(tmp_path / "dark.png")
+    assert dark.max() < 0.01  # there is no light
+    obj.meshfree.shaded = 0.5
+    formed = rendered(tmp_path / "formed.png")
+    assert 0.5 * flat.max() < formed.max() <= flat.max() + 0.02
+    assert formed.std(axis=0).max() > 0.08
     light = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
     light.rotation_euler = (0.8, 0.0, 0.0)
     bpy.context.scene.collection.objects.link(light)
+    assert_allclose(rendered(tmp_path / "same.png"), formed, atol=0.02)  # whatever the lights
+    obj.meshfree.shaded = 1.0
     lit = rendered(tmp_path / "lit.png")
     assert lit.std(axis=0).max() > 0.1
+
+
+def test_the_light_beside_the_camera_comes_from_the_upper_left(tmp_path):
+    obj = add_object(sphere_points(6000))
+    add_values(obj, "same", np.full(6000, 3.0))
+    bpy.ops.meshfree.show_surface()
+    show(obj, "same")
+    obj.rotation_euler = 0.3, 2.0, 1.0  # whichever way it is turned
+    levels = []
+    for obj.meshfree.shaded in (0.0, 0.5):
+        rendered(tmp_path / "sphere.png")
+        pixels = np.array(bpy.data.images.load(str(tmp_path / "sphere.png")).pixels).reshape(64, 64, 4)
+        levels.append(
+            np.where(pixels[:, :, 1] <= 0.04045, pixels[:, :, 1] / 12.92, ((pixels[:, :, 1] + 0.055) / 1.055) ** 2.4)
+        )
+        bpy.data.images.remove(bpy.data.images["sphere.png"])
+    place = (np.arange(64) + 0.5) / 16.0 - 2.0
+    x, y = np.meshgrid(place, place)
+    inside = np.hypot(x, y) < 0.9
+    toward = -0.36 * x + 0.36 * y + 0.86 * np.sqrt(np.maximum(1.0 - x**2 - y**2, 0.0))
+    expected = 0.08 + 0.92 * (0.5 + 0.5 * toward) ** 3
+    assert_allclose(levels[1][inside] / levels[0][inside], expected[inside], atol=0.08)
 
 
 def test_displays_of_an_earlier_version_become_smooth_and_keep_what_was_set(modifiers, obj):
