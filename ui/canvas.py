@@ -22,6 +22,12 @@ class Text(NamedTuple):
     part: str = ""  # its part of a legend in renders
 
 
+def text_width(text) -> float:
+    """Return the width of a text, in units of the user interface."""
+    blf.size(FONT, FONT_SIZE)
+    return blf.dimensions(FONT, text)[0]
+
+
 class Picture:
     """Shapes on a background plate, in units of the user interface from its lower left corner."""
 

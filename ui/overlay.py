@@ -18,9 +18,12 @@ from .value_range import histogram
 
 _GAP = 10.0  # between pictures, and to the border
 _GIZMOS = 80.0  # width of the view's own controls, at the right edge above the lowest row
-_CORNER = (1.0, 0.0)  # default position of a legend, arranged with the other pictures
+_TEXTS = 110.0  # height of the view's own texts, at the upper left
+_CORNER = (1.0, 0.0)  # default position of a legend: in the corner where it covers least of the object
+_SAMPLE = 500  # points that tell what it covers
 _handlers = []
 _counted = {}  # the last histogram, by key
+_chosen = {}  # the number of the corner of a legend, by the pointer of the region
 
 
 def attach():
@@ -34,6 +37,7 @@ def detach():
     while _handlers:
         bpy.types.SpaceView3D.draw_handler_remove(_handlers.pop(), "WINDOW")
     _counted.clear()
+    _chosen.clear()
 
 
 def pictures(obj, scene, colored=True) -> list:
@@ -157,11 +161,55 @@ def in_view(context, obj):
     left, bottom, right, top = _free_room(context.area, context.region)
     room = left + gap, bottom + gap, right, top
     sizes = [(scale * picture.width + gap, scale * picture.height + gap) for picture in found]
-    shares = tuple(obj.meshfree.legend_place)
-    moved = found and found[0].movable and shares != _CORNER
-    corners = arrange(sizes[1:] if moved else sizes, *room, indent=scale * _GIZMOS)
-    placed = Placed(room, sizes[0]) if found and found[0].movable else None
-    return list(zip(found, [placed.corner(shares), *corners] if moved else corners, strict=True)), placed
+    if not found or not found[0].movable:
+        return list(zip(found, arrange(sizes, *room, indent=scale * _GIZMOS), strict=True)), None
+    shares, placed = tuple(obj.meshfree.legend_place), Placed(room, sizes[0])
+    if shares != _CORNER:
+        return list(
+            zip(found, [placed.corner(shares), *arrange(sizes[1:], *room, scale * _GIZMOS)], strict=True)
+        ), placed
+    corners = arrange(sizes, *room, scale * _GIZMOS)
+    if corners[0] is not None:
+        (width, height), (left, bottom, right, top) = sizes[0], room
+        free = [(left, bottom), (left, top - scale * _TEXTS - height), (right - scale * _GIZMOS - width, top - height)]
+        there = [corners[0], *(corner for corner in free if corner[0] >= left and corner[1] >= bottom)]
+        known, region = seen_places(context, obj), context.region.as_pointer()
+        _chosen[region] = least_covering(there, sizes[0], known, _chosen.get(region, 0))
+        corners[0] = there[_chosen[region]]
+    return list(zip(found, corners, strict=True)), placed
+
+
+def seen_places(context, obj):
+    """Return where some points of an object are in the view of a context, (k, 2), in pixels of its region."""
+    positions = obj.data.attributes.get("position")
+    if obj.mode == "EDIT" or positions is None or not len(positions.data):
+        places = np.array(obj.bound_box)
+    else:
+        rows = np.linspace(0, len(positions.data) - 1, min(_SAMPLE, len(positions.data))).astype(int)
+        places = np.array([positions.data[row].vector for row in rows.tolist()])
+    matrix = np.array(context.region_data.perspective_matrix @ obj.matrix_world)
+    x, y, _, depth = matrix[:, :3] @ places.T + matrix[:, 3:]
+    size = context.region.width, context.region.height
+    return (0.5 * np.stack([x, y], axis=1) / np.where(depth > 0.0, depth, np.nan)[:, None] + 0.5) * size
+
+
+def least_covering(corners, size, places, now: int) -> int:
+    """Choose where a rectangle covers the fewest places, (k, 2); it stays at its present corner unless another is free.
+
+    Parameters
+    ----------
+    corners : list of (float, float)
+        Lower left ones.
+    size : (float, float)
+    places : ndarray, (k, 2)
+        NaN where they are not seen.
+    now : int
+        Which of the corners it is at.
+    """
+    inside = [((places >= corner) & (places <= np.add(corner, size))).all(axis=1) for corner in corners]
+    covered = np.array([np.count_nonzero(each) for each in inside])
+    now = min(now, len(corners) - 1)
+    return now if covered[now] == 0 or covered.min() > 0 else int(np.argmin(covered))
 
 
 def _draw():

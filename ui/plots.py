@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..command.ticks import round_ticks, tick_texts
-from .canvas import DIM, WHITE, Picture
+from .canvas import DIM, WHITE, Picture, text_width
 from .colormaps import to_display
 
 HEIGHT = 230.0
@@ -12,15 +12,18 @@ _LINE = 16.0  # height of a line of text
 _BEYOND = (0.45, 0.45, 0.45, 1.0)
 _MARK = (1.0, 0.75, 0.2, 1.0)
 _BOX = 18.0  # height of a box in a legend
+_ROWS = 6  # lines that its colors are as high as, at least
 _NAMED = 24  # letters in the names of bins, at most: of more only the first and the last bin have one
 
 
-def legend_picture(scale, width: float = 150.0) -> Picture:
-    """Draw the colours of a scale with their numbers, for the view and for renders."""
-    picture = Picture(width, _title_height(scale.unit) + len(scale.boxes) * _BOX + _EDGE if scale.boxes else HEIGHT)
+def legend_picture(scale, width: float = 0.0) -> Picture:
+    """Draw the colours of a scale with their numbers: for renders of some width, for the view as large as needed."""
+    left, right, bottom = _EDGE, _EDGE + 20.0, _EDGE
+    heading, rows = _title_height(scale.unit) + _EDGE, max(len(scale.ticks), _ROWS) * _LINE
+    height = heading + len(scale.boxes) * _BOX if scale.boxes else HEIGHT if width else heading + rows
+    picture = Picture(width or _EDGE + _widest(scale, right + 10.0), height)
     picture.movable = True
     top = _title(picture, scale.title, scale.unit)
-    left, right, bottom = _EDGE, _EDGE + 20.0, _EDGE
     if scale.boxes:
         for index, (name, color) in enumerate(scale.boxes.items()):
             y = top - (index + 1) * _BOX
@@ -38,6 +41,14 @@ def legend_picture(scale, width: float = 150.0) -> Picture:
         picture.line((right, y), (right + 5.0, y), WHITE)
         picture.text(text, right + 10.0, y, part=f"tick {index}")
     return picture
+
+
+def _widest(scale, right):
+    """Return where the texts of a legend end at most, of which the numbers begin at the right of the colors."""
+    beside = [*scale.boxes, *(text for _, text in scale.ticks)]
+    return max(
+        _EDGE + max(map(text_width, (scale.title, scale.unit))), right + max(map(text_width, beside), default=0.0)
+    )
 
 
 def histogram_picture(scale, edges, counts, beyond) -> Picture:

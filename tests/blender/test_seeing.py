@@ -358,6 +358,29 @@ def test_pictures_are_arranged_from_the_right_without_overlap(overlay):
     assert overlay.arrange(sizes, 0, 0, 80, 500) == [None, None, None]
 
 
+def test_a_legend_goes_where_it_covers_nothing_and_stays_there(overlay):
+    corners, size = [(900, 0), (0, 0), (0, 400)], (100, 100)
+    right, both = np.array([[950.0, 50.0], [500.0, 300.0], [np.nan, np.nan]]), np.array([[950.0, 50.0], [50.0, 50.0]])
+    assert overlay.least_covering(corners, size, right[1:], 0) == 0
+    assert overlay.least_covering(corners, size, right, 0) == 1
+    assert overlay.least_covering(corners, size, right[1:], 1) == 1
+    assert overlay.least_covering(corners, size, both, 0) == overlay.least_covering(corners, size, both, 1) == 2
+    assert overlay.least_covering(corners[:2], size, both, 0) == 0
+    assert overlay.least_covering(corners[:2], size, both, 2) == 1
+
+
+def test_a_legend_is_as_wide_as_its_texts(overlay, obj):
+    """They end a little before the edge of its plate, whatever is shown."""
+    for name in ("lb_mean_curvature", "lb_area", "lb_boundary"):
+        bpy.ops.meshfree.colormap(attribute=name)
+        picture = overlay.pictures(obj, bpy.context.scene)[0]
+        width = part("ui.canvas").text_width
+        ends = [text.x + width(text.text) for text in picture.texts]
+        assert picture.width - 24.0 < max(ends) <= picture.width - 5.0
+        lines = sorted(text.y for text in picture.texts if "tick" in text.part)
+        assert not lines or np.diff(lines).min() > 11.0
+
+
 def region(kind, alignment, x, y, width, height):
     return SimpleNamespace(type=kind, alignment=alignment, x=x, y=y, width=width, height=height)
 

@@ -1,0 +1,96 @@
+"""What is shown follows what the user does: points that go, objects that are deleted, views, and the legend."""
+
+import pytest
+
+from tests.gui.test_measures import edit
+from tests.gui.test_panels import COLORED, opened  # noqa: F401
+from tests.gui.test_play import add_sphere, finish, shading
+
+COUNT = "len(bpy.context.object.data.vertices)"
+FRESH = "bpy.context.object.meshfree.discs_of == bpy.context.object.meshfree.spacing_of != known"
+SHADING = "view3d()[0].spaces.active.shading.type"
+# How many points of the active object lie behind its legend, and the size of that beside those of its texts.
+COVERED = """
+from bl_ext.user_default.meshfree_laplacian.ui import canvas, overlay
+area, region, _ = view3d()
+with bpy.context.temp_override(window=main_window(), area=area, region=region):
+    context, obj = bpy.context, bpy.context.object
+    [(picture, corner), *_], placed = overlay.in_view(context, obj)
+    places, low = overlay.seen_places(context, obj), np.array(corner)
+    behind = ((places > low) & (places < low + placed.size)).all(axis=1).sum()
+ends = [text.x + canvas.text_width(text.text) for text in picture.texts]
+(int(behind), [float(value) for value in corner], picture.width - max(ends))
+"""
+
+
+def with_surface(gui, count):
+    add_sphere(gui, count)
+    gui.python("bpy.ops.meshfree.show_surface(); known = bpy.context.object.meshfree.discs_of; bpy.ops.ed.undo_push()")
+
+
+@pytest.mark.parametrize("count", [3000, 90_000])  # at once, and in a thread
+def test_discs_follow_thinning(gui, count):
+    with_surface(gui, count)
+    gui.search("Mesh-Free Thin Out")
+    gui.key("Return")
+    gui.wait_until(f"{COUNT} < {count // 2}", 90)
+    finish(gui)
+    gui.wait_until(FRESH)
+
+
+def test_discs_follow_edit_mode(gui):
+    with_surface(gui, 3000)
+    edit(gui)
+    gui.key("a")
+    gui.python("bpy.ops.mesh.remove_doubles(threshold=0.05)")
+    gui.key("Tab")
+    gui.wait_until("bpy.context.object.mode == 'OBJECT'")
+    assert gui.python(COUNT) < 3000
+    gui.wait_until(FRESH)
+
+
+def test_a_deleted_object_goes(gui):
+    add_sphere(gui)
+    gui.python("other = bpy.data.objects['Cloud'].copy(); other.name = 'Other'")
+    gui.python("bpy.context.collection.objects.link(other); bpy.data.objects['Cloud'].meshfree.compared_with = other")
+    gui.python("bpy.data.objects['Cloud'].select_set(False); other.select_set(True)")
+    gui.python("bpy.context.view_layer.objects.active = other; bpy.ops.ed.undo_push()")
+    gui.point_at_view()
+    gui.key("Delete")
+    gui.wait_until("'Other' not in bpy.data.objects")
+    assert gui.python("bpy.data.objects['Cloud'].meshfree.compared_with is None")
+    gui.key("ctrl+z")
+    gui.wait_until("bpy.data.objects['Cloud'].meshfree.compared_with == bpy.data.objects['Other']")
+
+
+@pytest.mark.parametrize("opened", ["MESHFREE_PT_points"], indirect=True)
+def test_group_colors_give_the_shading_back(opened):  # noqa: F811
+    gui = opened
+    shading(gui, "SOLID")
+    gui.press(".meshfree.show_groups")
+    gui.wait_until(f"{SHADING} == 'MATERIAL'")
+    gui.press(".meshfree.show_groups")
+    gui.wait_until(f"{SHADING} == 'SOLID'")
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5])
+def test_the_legend_is_small_and_covers_nothing(gui, scale):
+    add_sphere(gui, 3000)
+    gui.python("bpy.ops.meshfree.show_surface(); bpy.ops.meshfree.colormap(attribute='position')")
+    gui.python("bpy.context.object.meshfree.component = 'Z'")
+    gui.python(COLORED)
+    gui.python(f"bpy.context.preferences.view.ui_scale = {scale}")
+    try:
+        gui.settle()
+        gui.shot(f"legend_{scale}")
+        behind, corner, left = gui.python(COVERED)
+        assert behind == 0
+        assert left < 24.0
+        gui.python("bpy.context.object.location = 2.5, 0.0, -1.0")  # where the legend was
+        gui.settle()
+        gui.shot(f"legend_moved_{scale}")
+        behind, moved, _ = gui.python(COVERED)
+        assert behind == 0
+        assert moved != corner
+    finally:
+        gui.python("bpy.context.preferences.view.ui_scale = 1.0")
