@@ -23,10 +23,9 @@ from ..types import Array, FilePath, Floats
 from .cut import HALO, NARROWEST, Plan, Room, spacing_around, spacings_away
 from .roughness import asked_wavelength
 from .seen import checked_viewpoint, orientation
-from .shelf import Record, Told
 from .site import Site
 from .steps import Step
-from .store import COLUMNS, POINTS, Store, tile_folder, write_manifest
+from .store import COLUMNS, POINTS, Record, Store, Told, tile_folder, write_manifest
 
 Chunks: TypeAlias = Iterable[tuple[Floats, dict[str, Array]]]  # coordinates, and what is told of the points besides
 
@@ -251,7 +250,7 @@ def _plan(counted: _Counted, tiles: int, halo: float, fitting: int | None) -> Pl
 
 def find_extent(site: Site, state: Any) -> tuple[None, Told]:
     """Find the box of a tile, and the spacing in it."""
-    points = site.shelf.own(site.number)
+    points = site.store.own(site.number)
     if not len(points):
         raise TooFewPointsError("The tile has no points.")
     points = check_points(points)
@@ -267,21 +266,20 @@ def find_extent(site: Site, state: Any) -> tuple[None, Told]:
 
 def find_halo(site: Site, state: Any) -> tuple[None, Told]:
     """Gather the points around a tile that belong to others."""
-    shelf, number = site.shelf, site.number
-    assert isinstance(shelf, Store)
-    halo, memory = shelf.manifest["halo"], shelf.manifest["memory"]
-    low, high = shelf.bounds(number)
-    tree, usual = cKDTree(shelf.own(number)), float(site.told("extent", "usual"))
+    store, number = site.store, site.number
+    halo, memory = store.manifest["halo"], store.manifest["memory"]
+    low, high = store.bounds(number)
+    tree, usual = cKDTree(store.own(number)), float(site.told("extent", "usual"))
     count = tree.n
     found: list[tuple[Array, ...]] = [
         (np.zeros((0, 3)), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=bool))
     ]
-    gap = np.maximum(np.maximum(low - shelf.record["high"], shelf.record["low"] - high), 0.0)
-    near = np.linalg.norm(gap, axis=1) <= halo * np.maximum(usual, shelf.record["widest"])  # not where there is none
+    gap = np.maximum(np.maximum(low - store.record["high"], store.record["low"] - high), 0.0)
+    near = np.linalg.norm(gap, axis=1) <= halo * np.maximum(usual, store.record["widest"])  # not where there is none
     near[number] = False
     for other in np.flatnonzero(near).tolist():
-        points = shelf.own(other)
-        place, away = spacings_away(tree, usual, points, shelf.read("extent", other, "spacing"), halo)
+        points = store.own(other)
+        place, away = spacings_away(tree, usual, points, store.read("extent", other, "spacing"), halo)
         count += len(place)
         if memory is not None and needed_memory(count, site.options) > memory:
             raise NotEnoughMemoryError(
@@ -294,16 +292,16 @@ def find_halo(site: Site, state: Any) -> tuple[None, Told]:
     return None, {name: np.concatenate(column) for name, column in zip(names, zip(*found, strict=True), strict=True)}
 
 
-def list_boxes(shelf: Any, options: LaplacianOptions) -> Record:
+def list_boxes(store: Store, options: LaplacianOptions) -> Record:
     """List the boxes of all tiles, and the widest spacing in each; NaN where that is not known."""
     record = {
-        "low": np.full((shelf.count, 3), np.nan),
-        "high": np.full((shelf.count, 3), np.nan),
-        "widest": np.full(shelf.count, np.nan),
+        "low": np.full((store.count, 3), np.nan),
+        "high": np.full((store.count, 3), np.nan),
+        "widest": np.full(store.count, np.nan),
     }
     for name, column in record.items():
-        for number in shelf.alive:
-            column[number] = shelf.read("extent", number, name)
+        for number in store.alive:
+            column[number] = store.read("extent", number, name)
     return record
 
 

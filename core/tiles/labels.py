@@ -11,8 +11,8 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components, mini
 
 from ..geometry import ScaledPoints, label_connected
 from ..types import Array, Bools, Floats, Ints
-from .shelf import Record, Shelf, Told, visited
 from .site import Site
+from .store import Record, Store, Told
 
 
 def label_links(site: Site, scaled: ScaledPoints, index: Ints, joined: Bools) -> Told:
@@ -72,17 +72,17 @@ class Merged(NamedTuple):
     size: Ints
 
 
-def merge_labels(shelf: Shelf, step: str) -> Merged:
+def merge_labels(store: Store, step: str) -> Merged:
     """Merge the labels that `label_links` gave in a step, over the points that links reach in other tiles."""
-    sizes = list(shelf.told(step, "size"))
-    start = starts(shelf, step, map(len, sizes))
+    sizes = list(store.told(step, "size"))
+    start = starts(store, step, map(len, sizes))
     edges: list[Ints] = [np.zeros((2, 0), dtype=np.int64)]
-    for number in visited(shelf, step):
-        owner, place, reached = (shelf.read(step, number, name) for name in ("owner", "place", "reached"))
+    for number in store.visited(step):
+        owner, place, reached = (store.read(step, number, name) for name in ("owner", "place", "reached"))
         for other in np.unique(owner):
-            if shelf.done(step, int(other)):
+            if store.done(step, int(other)):
                 rows = owner == other
-                known = shelf.read(step, int(other), "label")[place[rows]]
+                known = store.read(step, int(other), "label")[place[rows]]
                 pairs = np.stack([start[other] + known, start[number] + reached[rows]])[:, known >= 0]
                 edges.append(np.unique(pairs, axis=1))
     first, second = np.concatenate(edges, axis=1)
@@ -91,7 +91,7 @@ def merge_labels(shelf: Shelf, step: str) -> Merged:
     return Merged(start, label, np.bincount(label, np.concatenate(sizes)).astype(np.int64))
 
 
-def starts(shelf: Shelf, step: str, counts: Iterable[int]) -> Ints:
+def starts(store: Store, step: str, counts: Iterable[int]) -> Ints:
     """Return where the labels of each tile begin among those of all, by how many a step has told of each that it has.
 
     Returns
@@ -99,7 +99,7 @@ def starts(shelf: Shelf, step: str, counts: Iterable[int]) -> Ints:
     ndarray, (tiles + 1,) int
         Up to the last tile that the step has been at.
     """
-    done = np.array(visited(shelf, step))
+    done = np.array(store.visited(step))
     length = np.zeros(done.max() + 2, dtype=np.int64)
     length[done + 1] = list(counts)
     begin: Ints = np.cumsum(length)

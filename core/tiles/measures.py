@@ -25,8 +25,8 @@ from .labels import agree_on_signs, starts
 from .neighborhoods import Fitted, divided
 from .roughness import agree_on_wavelength, tell_lengths, tell_roughness
 from .seen import signs_by_seen, tell_seen
-from .shelf import Record, Shelf, Told, visited
 from .site import Site
+from .store import Record, Store, Told
 
 _LINK = 1e-3  # weight of links between patches of one tile, against points that two tiles have in common
 
@@ -71,15 +71,15 @@ def compare_sides(site: Site, fitted: Fitted) -> tuple[None, Told]:
     return None, {"pairs": kinds.T, "votes": np.bincount(kind.reshape(-1), alike, kinds.shape[1])}
 
 
-def agree_on_flips(shelf: Shelf, options: LaplacianOptions) -> Record:
+def agree_on_flips(store: Store, options: LaplacianOptions) -> Record:
     """Agree on which patches are reversed, so that all agree."""
-    alive = visited(shelf, "sides")
-    start = starts(shelf, "patches", map(int, shelf.told("patches", "count")))
+    alive = store.visited("sides")
+    start = starts(store, "patches", map(int, store.told("patches", "count")))
     votes: list[Array] = []
     for number in alive:
-        links, edges = shelf.read("patches", number, "links"), shelf.read("patches", number, "edges")
+        links, edges = store.read("patches", number, "links"), store.read("patches", number, "edges")
         votes.append(np.column_stack([links + start[number], _LINK * edges]))
-        pairs, alike = shelf.read("sides", number, "pairs"), shelf.read("sides", number, "votes")
+        pairs, alike = store.read("sides", number, "pairs"), store.read("sides", number, "votes")
         known = np.isin(pairs[:, 1], alive)  # not one that has failed since
         pairs, alike = pairs[known], alike[known]
         votes.append(np.column_stack([pairs[:, 0] + start[number], start[pairs[:, 1]] + pairs[:, 2], alike]))
@@ -103,11 +103,11 @@ def tell_sides(site: Site, fitted: Fitted) -> tuple[None, Told]:
     return None, {**told, "name": names, "sums": sums}
 
 
-def agree_on_outside(shelf: Shelf, options: LaplacianOptions) -> Record:
+def agree_on_outside(store: Store, options: LaplacianOptions) -> Record:
     """Agree on the outer side of each component."""
-    if shelf.record["orient"] != "outside":
-        return {"outer": signs_by_seen(shelf, "outside")}
-    return {"outer": signs_by_sums(_added(shelf, "outside", "sums"))}
+    if store.record["orient"] != "outside":
+        return {"outer": signs_by_seen(store, "outside")}
+    return {"outer": signs_by_sums(_added(store, "outside", "sums"))}
 
 
 def find_areas(site: Site, fitted: Fitted) -> tuple[Solved, Told]:
@@ -127,10 +127,10 @@ def find_areas(site: Site, fitted: Fitted) -> tuple[Solved, Told]:
     return Solved(cloud, areas), {"name": names, "sums": sums, **tell_lengths(site, cloud)}
 
 
-def agree_on_areas(shelf: Shelf, options: LaplacianOptions) -> Record:
+def agree_on_areas(store: Store, options: LaplacianOptions) -> Record:
     """Agree on by how much the areas of each component are scaled, and on the wavelength of the roughness."""
-    total, found = _added(shelf, "areas", "sums").T
-    return {"ratio": total / np.where(found > 0.0, found, 1.0), **agree_on_wavelength(shelf, "areas")}
+    total, found = _added(store, "areas", "sums").T
+    return {"ratio": total / np.where(found > 0.0, found, 1.0), **agree_on_wavelength(store, "areas")}
 
 
 def measure(site: Site, solved: Solved) -> tuple[None, Told]:
@@ -170,9 +170,9 @@ def results(laplacian: LaplaceBeltrami, label: Ints | None, rows: Ints) -> tuple
     return found, [*laplacian.notices, *curvature.notices]
 
 
-def _added(shelf: Shelf, step: str, name: str) -> Floats:
+def _added(store: Store, step: str, name: str) -> Floats:
     """Return sums over all tiles, (labels, k), of what a step has told of each for the names of some labels."""
-    names, parts = list(shelf.told(step, "name")), list(shelf.told(step, name))
+    names, parts = list(store.told(step, "name")), list(store.told(step, name))
     total = np.zeros((max(int(label.max(initial=-1)) for label in names) + 1, parts[0].shape[1]))
     for label, part in zip(names, parts, strict=True):
         total[label] += part

@@ -11,10 +11,9 @@ from ..errors import InvalidPointsError
 from ..geometry import Prolongation, blue_noise_subset
 from ..memory import needed_memory
 from ..operator import build_laplacian
-from .shelf import Told
 from .site import Site
 from .steps import Step, at_first
-from .store import Store
+from .store import Store, Told
 
 _CANDIDATES = 3  # for each point wanted, from all tiles
 _MOST = 1_000_000  # points by which modes are computed, where the memory allows: more are slow to factorize
@@ -53,11 +52,10 @@ def ask_for_modes(store: Store, modes: int, most: int | None = None) -> None:
 
 def find_candidates(site: Site, state: Any) -> tuple[None, Told]:
     """Choose evenly spread points of a tile, more than are needed."""
-    component, points = site.told("measure", "component"), site.shelf.own(site.number)
+    component, points = site.told("measure", "component"), site.store.own(site.number)
     on = points[component >= 0]
-    assert isinstance(site.shelf, Store)
-    sizes = site.shelf.manifest["tiles"]
-    total = sum(sizes[number]["points"] for number in site.shelf.alive)
+    sizes = site.store.manifest["tiles"]
+    total = sum(sizes[number]["points"] for number in site.store.alive)
     wanted = -(-_CANDIDATES * int(site.record["mode points"]) * len(on) // total)
     chosen = blue_noise_subset(on, wanted) if len(on) else np.arange(0)
     return None, {"points": on[chosen]}
@@ -65,7 +63,7 @@ def find_candidates(site: Site, state: Any) -> tuple[None, Told]:
 
 def find_modes(site: Site, state: Any) -> tuple[None, Told]:
     """Compute the modes on evenly spread points of all tiles."""
-    points = np.concatenate(list(site.shelf.told("candidates", "points")))
+    points = np.concatenate(list(site.store.told("candidates", "points")))
     points = points[blue_noise_subset(points, int(site.record["mode points"]))]
     laplacian = build_laplacian(points, options=site.options)
     spectrum = laplacian.eigenpairs(int(site.record["modes"]))
@@ -80,10 +78,10 @@ def find_modes(site: Site, state: Any) -> tuple[None, Told]:
 
 def carry_modes(site: Site, state: Any) -> tuple[None, Told]:
     """Carry the modes to the points in the box of a tile."""
-    source = site.shelf.alive[0]
+    source = site.store.alive[0]
     names = ("points", "normals", "component", "vectors")
-    points, normals, component, vectors = (site.shelf.read("spectrum", source, name) for name in names)
-    own = site.shelf.own(site.number)
+    points, normals, component, vectors = (site.store.read("spectrum", source, name) for name in names)
+    own = site.store.own(site.number)
     near = np.unique(cKDTree(points).query(own, k=min(_NEIGHBORS, len(points)))[1])
     every = Prolongation(np.concatenate([points[near], own]), np.arange(len(near)), normals[near], component[near])
     modes = every.interpolate(vectors[near])[len(near) :]

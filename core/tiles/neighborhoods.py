@@ -43,8 +43,8 @@ from ..types import Floats, Ints
 from .labels import label_links, merge_labels, names_of, starts
 from .medians import median
 from .places import points_around
-from .shelf import Record, Shelf, Told
 from .site import Site
+from .store import Record, Store, Told
 
 _FILLED = 50_000  # points by which that is judged which fill volumes
 
@@ -65,13 +65,13 @@ def look_for_rounding(site: Site, state: Any) -> tuple[ScaledPoints, Told]:
     return scaled, {"count": np.array(count), "squares": count * np.outer(rounding, rounding)}
 
 
-def agree_on_rounding(shelf: Shelf, options: LaplacianOptions) -> Record:
+def agree_on_rounding(store: Store, options: LaplacianOptions) -> Record:
     """Agree on the direction along which most points are rounded in steps, and on these; zero where most are not."""
-    found = np.array([np.trace(squares) > 0.0 for squares in shelf.told("rounding", "squares")])
-    count = np.array(list(shelf.told("rounding", "count")))
+    found = np.array([np.trace(squares) > 0.0 for squares in store.told("rounding", "squares")])
+    count = np.array(list(store.told("rounding", "count")))
     if count[found].sum() <= 0.5 * count.sum():
         return {"rounded": np.zeros(3)}
-    square, axes = np.linalg.eigh(sum(shelf.told("rounding", "squares")) / count[found].sum())
+    square, axes = np.linalg.eigh(sum(store.told("rounding", "squares")) / count[found].sum())
     return {"rounded": np.sqrt(square[2]) * axes[:, 2]}
 
 
@@ -82,9 +82,9 @@ def find_spacing(site: Site, scaled: ScaledPoints) -> tuple[Sample, Told]:
     return sample, {"spacing": sample.nearest.spacing[inner], "distinct": np.array(len(scaled.points))}
 
 
-def agree_on_spacing(shelf: Shelf, options: LaplacianOptions) -> Record:
+def agree_on_spacing(store: Store, options: LaplacianOptions) -> Record:
     """Agree on the usual spacing."""
-    return {"spacing": np.array(median(lambda: shelf.told("spacing", "spacing")))}
+    return {"spacing": np.array(median(lambda: store.told("spacing", "spacing")))}
 
 
 def find_reach(site: Site, sample: Sample) -> tuple[Sample | None, Told]:
@@ -94,9 +94,9 @@ def find_reach(site: Site, sample: Sample) -> tuple[Sample | None, Told]:
     return left if changed else None, {"reach": gap_reach(left.nearest)[site.inner(left.scaled)]}
 
 
-def agree_on_reach(shelf: Shelf, options: LaplacianOptions) -> Record:
+def agree_on_reach(store: Store, options: LaplacianOptions) -> Record:
     """Agree on the usual edge that is no gap."""
-    return {"reach": np.array(median(lambda: shelf.told("reach", "reach")))}
+    return {"reach": np.array(median(lambda: store.told("reach", "reach")))}
 
 
 def link_strictly(site: Site, sample: Sample) -> tuple[None, Told]:
@@ -105,9 +105,9 @@ def link_strictly(site: Site, sample: Sample) -> tuple[None, Told]:
     return None, label_links(site, sample.scaled, sample.nearest.index[:, 1:], strict)
 
 
-def agree_on_large(shelf: Shelf, options: LaplacianOptions) -> Record:
+def agree_on_large(store: Store, options: LaplacianOptions) -> Record:
     """Agree on which components have some size."""
-    merged = merge_labels(shelf, "gaps")
+    merged = merge_labels(store, "gaps")
     return names_of("gaps", "large", merged.start, (number_sizes(merged.size, COUNT) >= 0)[merged.label])
 
 
@@ -123,11 +123,11 @@ def link_loosely(site: Site, sample: Sample) -> tuple[None, Told]:
     return None, {**told, "large": many}
 
 
-def agree_on_components(shelf: Shelf, options: LaplacianOptions) -> Record:
+def agree_on_components(store: Store, options: LaplacianOptions) -> Record:
     """Agree on the numbers of components."""
-    merged = merge_labels(shelf, "components")
+    merged = merge_labels(store, "components")
     large = np.zeros(len(merged.size), dtype=bool)
-    np.logical_or.at(large, merged.label, np.concatenate(list(shelf.told("components", "large"))))
+    np.logical_or.at(large, merged.label, np.concatenate(list(store.told("components", "large"))))
     number = np.full(len(merged.size), -1)
     number[large] = number_sizes(merged.size[large], COUNT)
     smallest = merged.size[number >= 0].min()
@@ -153,7 +153,7 @@ def find_noise(site: Site, sample: Sample) -> tuple[Fitted, Told]:
     }
 
 
-def agree_on_noise(shelf: Shelf, options: LaplacianOptions) -> Record:
+def agree_on_noise(store: Store, options: LaplacianOptions) -> Record:
     """Agree on whether there is noise to smooth, and on the middle of the points that fill volumes.
 
     Raises
@@ -161,20 +161,20 @@ def agree_on_noise(shelf: Shelf, options: LaplacianOptions) -> Record:
     NotASurfaceError
         The points of many neighborhoods lie along a curve.
     """
-    count, curves, noisy, filling = np.sum(list(shelf.told("noise", "counts")), axis=0).tolist()
+    count, curves, noisy, filling = np.sum(list(store.told("noise", "counts")), axis=0).tolist()
     check_surface(curves, count)
     if options.projection != "auto":
         return {}
     agreed = {"noisy": np.array(noisy / count >= MANY)}
     if filling:
-        agreed["filled"] = shelf.record["center"] + np.sum(list(shelf.told("noise", "offset")), axis=0) / filling
+        agreed["filled"] = store.record["center"] + np.sum(list(store.told("noise", "offset")), axis=0) / filling
     return agreed
 
 
 def find_filling(site: Site, state: object) -> tuple[None, Told]:
     """Follow how points that fill volumes fare as noise is smoothed, around the one next to the middle of all."""
-    around = points_around(site.shelf, site.record["filled"], _FILLED, "fills")
-    trial = Site(site.shelf, -1, site.options, around)
+    around = points_around(site.store, site.record["filled"], _FILLED, "fills")
+    trial = Site(site.store, -1, site.options, around)
     sample, _ = find_spacing(trial, look_for_rounding(trial, None)[0])
     left, _ = find_reach(trial, sample)
     fitted, _ = find_noise(trial, left or sample)
@@ -183,9 +183,9 @@ def find_filling(site: Site, state: object) -> tuple[None, Told]:
     return None, {"filling": np.array(() if filling is None else filling)}
 
 
-def agree_on_filling(shelf: Shelf, options: LaplacianOptions) -> Record:
+def agree_on_filling(store: Store, options: LaplacianOptions) -> Record:
     """Agree on that."""
-    told = list(shelf.told("filling", "filling"))
+    told = list(store.told("filling", "filling"))
     return {"filling": told[0]} if told and len(told[0]) else {}
 
 
@@ -197,11 +197,11 @@ def link_sheets(site: Site, fitted: Fitted) -> tuple[Fitted | None, Told]:
     return None if surface is given else Fitted(surface), told
 
 
-def agree_on_large_sheets(shelf: Shelf, options: LaplacianOptions) -> Record:
+def agree_on_large_sheets(store: Store, options: LaplacianOptions) -> Record:
     """Agree on the numbers of sheets of some size."""
     if not options.sheets:
         return {}
-    merged = merge_labels(shelf, "sheets")
+    merged = merge_labels(store, "sheets")
     return names_of("sheets", "large sheet", merged.start, number_sizes(merged.size, COUNT)[merged.label])
 
 
@@ -220,13 +220,13 @@ def join_sheets(site: Site, fitted: Fitted) -> tuple[None, Told]:
     return None, {"label": site.own(sample.scaled, label, -1), "kind": kinds.T, "size": size}
 
 
-def agree_on_sheets(shelf: Shelf, options: LaplacianOptions) -> Record:
+def agree_on_sheets(store: Store, options: LaplacianOptions) -> Record:
     """Agree on the numbers of sheets within components."""
-    kinds = list(shelf.told("touching", "kind"))
+    kinds = list(store.told("touching", "kind"))
     _, label = np.unique(np.concatenate(kinds), axis=0, return_inverse=True)
     label = label.reshape(-1)
-    size = np.bincount(label, np.concatenate(list(shelf.told("touching", "size")))).astype(np.int64)
-    return names_of("touching", "sheet", starts(shelf, "touching", map(len, kinds)), number_sizes(size, 0)[label])
+    size = np.bincount(label, np.concatenate(list(store.told("touching", "size")))).astype(np.int64)
+    return names_of("touching", "sheet", starts(store, "touching", map(len, kinds)), number_sizes(size, 0)[label])
 
 
 def link_pieces(site: Site, fitted: Fitted) -> tuple[None, Told]:
@@ -235,9 +235,9 @@ def link_pieces(site: Site, fitted: Fitted) -> tuple[None, Told]:
     return None, _link_neighbors(site, surface, site.sides()[surface.sample.scaled.first], True)
 
 
-def agree_on_pieces(shelf: Shelf, options: LaplacianOptions) -> Record:
+def agree_on_pieces(store: Store, options: LaplacianOptions) -> Record:
     """Agree on which pieces these make."""
-    merged = merge_labels(shelf, "pieces")
+    merged = merge_labels(store, "pieces")
     return names_of("pieces", "piece", merged.start, merged.label)
 
 
@@ -260,9 +260,9 @@ def find_bridges(site: Site, fitted: Fitted) -> tuple[None, Told]:
     return None, {"piece": ends[kept], "gap": gap[kept], "edge": edge.reshape(-1, 4).astype(np.int64)}
 
 
-def agree_on_bridges(shelf: Shelf, options: LaplacianOptions) -> Record:
+def agree_on_bridges(store: Store, options: LaplacianOptions) -> Record:
     """Agree on the edges over which pieces hang together."""
-    piece, gap, edge = (np.concatenate(list(shelf.told("bridges", name))) for name in ("piece", "gap", "edge"))
+    piece, gap, edge = (np.concatenate(list(store.told("bridges", name))) for name in ("piece", "gap", "edge"))
     bridges: Ints = edge[choose_bridges(piece[:, 0], piece[:, 1], gap)]
     return {"bridges": bridges}
 
@@ -275,9 +275,9 @@ def find_length(site: Site, fitted: Fitted) -> tuple[None, Told]:
     return None, {"sum": np.array(own.sum()), "count": np.array(len(own))}
 
 
-def agree_on_length(shelf: Shelf, options: LaplacianOptions) -> Record:
+def agree_on_length(store: Store, options: LaplacianOptions) -> Record:
     """Agree on the mean of that."""
-    total, count = (sum(map(float, shelf.told("length", name))) for name in ("sum", "count"))
+    total, count = (sum(map(float, store.told("length", name))) for name in ("sum", "count"))
     return {"length": np.array(total / count)}
 
 

@@ -6,33 +6,33 @@ import numpy as np
 
 from ..types import Floats
 from .cut import outside
-from .shelf import Part, Shelf
+from .store import Part, Store
 
 
-def points_around(shelf: Shelf, place: Floats, count: int, marked: str = "") -> Part:
+def points_around(store: Store, place: Floats, count: int, marked: str = "") -> Part:
     """Return so many points of all tiles that are next to the one at a place, nearest first.
 
     Parameters
     ----------
-    shelf : Shelf
+    store : Store
     place : ndarray, (3,)
         The point next to it is the middle.
     count : int
     marked : str
         The middle is one of those that the step "noise" has marked under this name.
     """
-    return _nearest(shelf, _nearest(shelf, place, 1, marked).points[0], count)
+    return _nearest(store, _nearest(store, place, 1, marked).points[0], count)
 
 
-def _nearest(shelf: Shelf, place: Floats, count: int, marked: str = "") -> Part:
+def _nearest(store: Store, place: Floats, count: int, marked: str = "") -> Part:
     """Return so many points that are next to a place, nearest first; only marked ones where a name is given."""
     found = np.zeros((0, 6))
-    away = {number: float(outside(place[None], *shelf.bounds(number))[0]) for number in shelf.alive}
+    away = {number: float(outside(place[None], *store.bounds(number))[0]) for number in store.alive}
     for number in sorted(away, key=lambda number: away[number]):
         if len(found) == count and found[-1, 0] < away[number]:
             break
-        points = shelf.own(number)
-        rows = np.flatnonzero(shelf.read("noise", number, marked)) if marked else np.arange(len(points))
+        points = store.own(number)
+        rows = np.flatnonzero(store.read("noise", number, marked)) if marked else np.arange(len(points))
         distance = np.linalg.norm(points[rows] - place, axis=1)
         near = np.argsort(distance, kind="stable")[:count]
         columns = [distance[near], np.full(len(near), number), rows[near], points[rows[near]]]

@@ -10,8 +10,8 @@ from ..geometry import Cloud
 from ..operator import LaplaceBeltrami
 from ..types import Floats
 from .medians import median
-from .shelf import Record, Shelf, Told
 from .site import Site
+from .store import Record, Store, Told
 
 ROUGHNESS = "roughness"  # the name of this result, which a store has if it was asked for
 _WAVELENGTH = "wavelength"
@@ -33,11 +33,11 @@ def tell_lengths(site: Site, cloud: Cloud) -> Told:
     return {"lengths": lengths[~np.isnan(lengths)]}
 
 
-def agree_on_wavelength(shelf: Shelf, step: str) -> Record:
+def agree_on_wavelength(store: Store, step: str) -> Record:
     """Agree on the wavelength of the whole cloud, by the lengths that a step has told; as of `mf.clean.roughness`."""
-    if shelf.record.get(_WAVELENGTH) != 0.0:
+    if store.record.get(_WAVELENGTH) != 0.0:
         return {}
-    return {_WAVELENGTH: np.array(DETAIL * median(lambda: shelf.told(step, "lengths")))}
+    return {_WAVELENGTH: np.array(DETAIL * median(lambda: store.told(step, "lengths")))}
 
 
 def tell_roughness(site: Site, laplacian: LaplaceBeltrami) -> Told:

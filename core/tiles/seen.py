@@ -12,8 +12,8 @@ from ..errors import InvalidPointsError
 from ..files import SCANNER
 from ..geometry import Sample
 from ..types import Array, Floats, Ints
-from .shelf import Record, Shelf, Told
 from .site import Site
+from .store import Record, Store, Told
 
 ORIENTS = ("outside", "up", "viewpoint")
 _CELL = 8.0  # spacings: a surface seen from the front has some 64 points in a cell, of which the nearest counts
@@ -100,17 +100,17 @@ def tell_seen(site: Site, sample: Sample, rows: Ints, side: Floats, surface: Int
         usual = max(float(np.linalg.norm(place)), 1.0)  # distance of most points
         distance = np.linalg.norm(towards, axis=1)
         return _nearest(surface, _cube_cells(towards, step / usual), distance, _cosines(side, towards))
-    scanner = site.shelf.columns(site.number)[SCANNER][site.part.place[sample.scaled.first[rows]]]
+    scanner = site.store.columns(site.number)[SCANNER][site.part.place[sample.scaled.first[rows]]]
     towards = (scanner.astype(np.float64) - record["center"]) / record["scale"] - places
     names, label = np.unique(surface, return_inverse=True)
     every = np.bincount(label.reshape(-1), _cosines(side, towards), len(names))
     return _nearest(names, np.full(len(names), site.number), np.zeros(len(names)), every)
 
 
-def signs_by_seen(shelf: Shelf, step: str) -> Floats:
+def signs_by_seen(store: Store, step: str) -> Floats:
     """Return the sign of each surface, (surfaces,), by what a step has told of them with `tell_seen`."""
     names = ("surface", "cell", "depth", "cosine")
-    told = _nearest(*(np.concatenate(list(shelf.told(step, name))) for name in names))
+    told = _nearest(*(np.concatenate(list(store.told(step, name))) for name in names))
     return np.where(np.bincount(told["surface"], told["cosine"]) < 0.0, -1.0, 1.0)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..geometry import Agreed, Decisions, ScaledPoints
 from ..options import LaplacianOptions
 from ..types import Array, Bools, Floats, Ints
-from .shelf import Part, Record, Shelf
+from .store import Part, Record, Store
 
 _SCALARS = ("scale", "spacing", "reach", "length")
 _LABELS = {"component": "components", "sheet": "touching"}  # by the step that tells them
@@ -21,7 +21,7 @@ class Site:
 
     Parameters
     ----------
-    shelf : Shelf
+    store : Store
     number : int
         Of the tile; -1 for points of several.
     options : LaplacianOptions
@@ -29,20 +29,20 @@ class Site:
         The points, if they are not those of the tile.
     """
 
-    def __init__(self, shelf: Shelf, number: int, options: LaplacianOptions, part: Part | None = None) -> None:
-        self.shelf, self.number, self.options = shelf, number, options
+    def __init__(self, store: Store, number: int, options: LaplacianOptions, part: Part | None = None) -> None:
+        self.store, self.number, self.options = store, number, options
         if part is not None:
             self.part = part
 
     @functools.cached_property
     def part(self) -> Part:
         """The points of the tile with its halo."""
-        return self.shelf.part(self.number)
+        return self.store.part(self.number)
 
     @property
     def record(self) -> Record:
         """What is agreed on."""
-        return self.shelf.record
+        return self.store.record
 
     def inner(self, scaled: ScaledPoints) -> Bools:
         """Return which of the distinct points lie in the box, (m,)."""
@@ -54,16 +54,16 @@ class Site:
 
     def told(self, step: str, name: str) -> Array:
         """Return what the tile itself has told in a step before."""
-        return self.shelf.read(step, self.number, name)
+        return self.store.read(step, self.number, name)
 
     def around(self, step: str, name: str, neutral: Any) -> Array:
         """Return what the tiles of all points here, (k,), have told of these in a step before."""
         part, result = self.part, None
         for owner in np.unique(part.owner):
-            if not self.shelf.done(step, int(owner)):
+            if not self.store.done(step, int(owner)):
                 continue
             rows = part.owner == owner
-            values = self.shelf.read(step, int(owner), name)[part.place[rows]]
+            values = self.store.read(step, int(owner), name)[part.place[rows]]
             if result is None:
                 result = np.full((len(rows), *values.shape[1:]), neutral, values.dtype)
             result[rows] = values

@@ -12,24 +12,24 @@ import numpy as np
 from ..errors import PointCloudError
 from ..options import LaplacianOptions
 from . import measures, neighborhoods
-from .shelf import Record, Shelf, Told
 from .site import Site
+from .store import Record, Store, Told
 
 
-def _all(shelf: Shelf) -> Sequence[int]:
-    return shelf.alive
+def _all(store: Store) -> Sequence[int]:
+    return store.alive
 
 
-def at_first(shelf: Shelf) -> Sequence[int]:
+def at_first(store: Store) -> Sequence[int]:
     """Return the one tile at which a step is that is of all."""
-    return shelf.alive[:1]
+    return store.alive[:1]
 
 
-def _at_first_if_filled(shelf: Shelf) -> Sequence[int]:
-    return at_first(shelf) if "filled" in shelf.record else []
+def _at_first_if_filled(store: Store) -> Sequence[int]:
+    return at_first(store) if "filled" in store.record else []
 
 
-def _nothing(shelf: Shelf, options: LaplacianOptions) -> Record:
+def _nothing(store: Store, options: LaplacianOptions) -> Record:
     return {}
 
 
@@ -60,9 +60,9 @@ class Step:
         From the site of a tile, and the state that an earlier step has left there, to a new state, or None where that
         one stays, and to what the step tells of the tile.
     merge : callable
-        From the shelf and the options to what all tiles agree on then: small against the points.
+        From the store and the options to what all tiles agree on then: small against the points.
     where : callable
-        From the shelf to the numbers of the tiles at which the step is needed.
+        From the store to the numbers of the tiles at which the step is needed.
     needed : callable
         From the options to whether they ask for it.
     """
@@ -71,8 +71,8 @@ class Step:
     stage: str
     cost: float
     local: Callable[[Site, Any], tuple[Any, Told]]
-    merge: Callable[[Shelf, LaplacianOptions], Record] = _nothing
-    where: Callable[[Shelf], Sequence[int]] = _all
+    merge: Callable[[Store, LaplacianOptions], Record] = _nothing
+    where: Callable[[Store], Sequence[int]] = _all
     needed: Callable[[LaplacianOptions], bool] = _always
 
 
@@ -109,21 +109,21 @@ def part_of(steps: Sequence[Step], step: Step) -> tuple[float, float]:
     return float(ends[place] / ends[-1]), float(ends[place + 1] / ends[-1])
 
 
-def visit(shelf: Shelf, step: Step, number: int, options: LaplacianOptions) -> None:
+def visit(store: Store, step: Step, number: int, options: LaplacianOptions) -> None:
     """Take a step at one tile, unless that is done, and keep what it tells."""
-    if shelf.done(step.name, number):
+    if store.done(step.name, number):
         return
     began = process_time()
     try:
-        state, told = step.local(Site(shelf, number, options), shelf.state(step.name, number))
+        state, told = step.local(Site(store, number, options), store.state(step.name, number))
     except PointCloudError as error:
         if step.where is not _all:  # it is of all tiles, if at one place
             raise
-        shelf.fail(step.name, number, error)
+        store.fail(step.name, number, error)
     else:
-        shelf.put(step.name, number, {**told, "seconds": np.array(process_time() - began)}, state)
+        store.put(step.name, number, {**told, "seconds": np.array(process_time() - began)}, state)
 
 
-def agree(shelf: Shelf, step: Step, options: LaplacianOptions) -> Record:
+def agree(store: Store, step: Step, options: LaplacianOptions) -> Record:
     """Return what all tiles agree on after a step that has been at all of them."""
-    return step.merge(shelf, options)
+    return step.merge(store, options)

@@ -8,9 +8,9 @@ import os
 import pickle
 import zipfile
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, TypeAlias
 
 import numpy as np
 
@@ -18,8 +18,7 @@ from ..arguments import as_path
 from ..errors import NotEnoughMemoryError, PointCloudError
 from ..files import replacing, write_arrays
 from ..options import LaplacianOptions
-from ..types import Array, FilePath, Floats
-from .shelf import Part, Record, Told, visited
+from ..types import Array, Bools, FilePath, Floats, Ints
 
 VERSION = 4
 POINTS, COLUMNS = "points.npy", "columns.npy"
@@ -27,6 +26,34 @@ _MANIFEST, _ERROR = "manifest.json", "error.json"
 _TRUSTED = ("numpy", "scipy", "builtins", "copyreg", __package__.rpartition(".")[0])  # packages of what states hold
 _ALIGNED = 64  # bytes to a multiple of which arrays begin in a state
 _BUILTINS = {"slice", "set", "frozenset", "complex", "bytearray", "range", "object"}
+
+Told: TypeAlias = dict[str, Array]  # what a step tells of a tile, by names
+Record: TypeAlias = dict[str, Array]  # what all tiles have agreed on so far, by names
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """The points of a tile with its halo, and whose they are.
+
+    Attributes
+    ----------
+    points : ndarray, (k, 3)
+        Coordinates [L].
+    inner : ndarray, (k,) bool
+        Which lie in the box; each point lies in that of one tile.
+    close : ndarray, (k,) bool
+        Which lie in the box or in the nearer half of the halo: the far end tells less, as its neighbors are missing.
+    owner : ndarray, (k,) int
+        The tile in whose box each point lies.
+    place : ndarray, (k,) int
+        Its place among the points in that box.
+    """
+
+    points: Floats
+    inner: Bools
+    close: Bools
+    owner: Ints
+    place: Ints
 
 
 class Store:
@@ -135,9 +162,13 @@ class Store:
         except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
             raise PointCloudError(f"{path} cannot be read: {error}. Delete it, and take the steps again.") from error
 
+    def visited(self, step: str) -> list[int]:
+        """Return the tiles that can be measured and that a step has been at, in their order, as `told` has them."""
+        return [number for number in self.alive if self.done(step, number)]
+
     def told(self, step: str, name: str) -> Iterator[Array]:
         """Yield what a step has told of each tile under a name, but for those where it has not been."""
-        return (self.read(step, number, name) for number in visited(self, step))
+        return (self.read(step, number, name) for number in self.visited(step))
 
     def names(self, step: str, number: int) -> list[str]:
         """Return the names under which a step has told something of a tile."""
