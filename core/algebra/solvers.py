@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -50,53 +51,58 @@ def conjugate_gradients(
     scaling: Any = 1.0,
     rtol: float = 1e-9,
     products: int = _STEPS,
-    report: Callable[[int], None] = lambda step: None,
+    report: Callable[[int, float], None] = lambda step, left: None,
 ) -> Iterate:
-    """Solve ``matrix @ x = load``.
+    """Solve ``matrix @ x = load``, of several loads each by itself.
 
     Parameters
     ----------
     matrix : sparse array or LinearOperator, (m, m)
         Symmetric. A complex one is symmetric too, not Hermitian: products of vectors are taken without conjugation
         (COCG; van der Vorst and Melissen 1990), which for real ones is the usual method.
-    load : ndarray, (m,)
+    load : ndarray, (m,) or (m, k)
         In the range of the matrix.
-    start : ndarray, (m,), optional
+    start : ndarray of that shape, optional
         First guess.
-    scaling : float, ndarray, (m,), or LinearOperator, (m, m)
+    scaling : float, ndarray, (m,) or (m, 1), or LinearOperator, (m, m)
         Preconditioner, such as the inverse of the diagonal.
     rtol : float
         Of the residual against the load, or against that of the first guess where it is larger.
     products : int
         Most products with the matrix.
     report : callable
-        Called with the number of each step; may raise `Cancelled`.
+        Called with the number of each step and the residual; may raise `Cancelled`.
 
     Returns
     -------
     Iterate
+        Of several loads the greatest residual. Whether the matrix is definite is not judged.
     """
+    single = load.ndim == 1
+    size = partial(np.linalg.norm, axis=None if single else 0)
+    product: Callable[[Array, Array], Any] = np.dot if single else partial(np.einsum, "ij,ij->j")
     values = np.zeros_like(load) if start is None else start.copy()
     residual = load.copy() if start is None else load - matrix @ values
-    unit = max(np.linalg.norm(load), np.linalg.norm(residual)) or 1.0
+    unit = np.maximum(size(load), size(residual))
+    unit += unit == 0.0
     direction: Any = None
     moment: Any = None
     for step in range(products):
-        left = float(np.linalg.norm(residual) / unit)
+        left = float(np.max(size(residual) / unit, initial=0.0))
         if left <= rtol:
             return Iterate(values, step, True, left)
-        report(step)
+        report(step, left)
         scaled = scaling * residual
-        moment, previous = residual @ scaled, moment
-        direction = scaled if step == 0 else scaled + (moment / previous) * direction
+        moment, previous = product(residual, scaled), moment
+        direction = scaled if step == 0 else scaled + _ratio(moment, previous) * direction
         image = matrix @ direction
-        curvature = direction @ image
-        if np.isrealobj(curvature) and curvature <= 0.0:
+        curvature = product(direction, image)
+        if single and np.isrealobj(curvature) and curvature <= 0.0:
             return Iterate(values, step + 1, False, left, definite=False)
-        length = moment / curvature
+        length = _ratio(moment, curvature)
         values += length * direction
         residual -= length * image
-    left = float(np.linalg.norm(residual) / unit)
+    left = float(np.max(size(residual) / unit, initial=0.0))
     return Iterate(values, products, left <= rtol, left)
 
 
@@ -136,7 +142,7 @@ def solve_symmetric(
             progress("Solve", done / (done + 200.0))
         done += products
 
-    def report(step: int) -> None:
+    def report(step: int, left: float) -> None:
         if step % 20 == 0:
             count(20.0)
 
@@ -185,30 +191,22 @@ def solve_columns(matrix: sparse.csr_array, loads: Floats, rtol: float, report: 
     SolverError
         No convergence.
     """
-    values, residual = np.zeros_like(loads), loads.copy()
-    unit = np.linalg.norm(loads, axis=0)
-    unit[unit == 0.0] = 1.0
     with ThreadPoolExecutor(cores()) as pool:
         rows = Rows(matrix, pool, lambda: report(0.0))
         inverse = approximate_inverse(matrix, pool, lambda: report(0.0))
-        scaling = inverse or sparse.diags_array(1.0 / matrix.diagonal())
-        direction, moment, left = None, np.ones(loads.shape[1]), 1.0
-        for _ in range(_STEPS):
-            left = float((np.linalg.norm(residual, axis=0) / unit).max(initial=0.0))
-            if left <= rtol:
-                return values
-            report(min(np.log(left) / np.log(rtol), 1.0) if left < 1.0 else 0.0)
-            scaled = scaling @ residual
-            moment, previous = np.einsum("ij,ij->j", residual, scaled), moment
-            direction = scaled if direction is None else scaled + _ratio(moment, previous) * direction
-            image = rows @ direction
-            length = _ratio(moment, np.einsum("ij,ij->j", direction, image))
-            values += length * direction
-            residual -= length * image
-    raise SolverError(f"The equations of {len(loads)} points were not solved: a share of {left:.1g} is left.")
+        found = conjugate_gradients(
+            rows,
+            loads,
+            scaling=inverse or 1.0 / matrix.diagonal()[:, None],
+            rtol=rtol,
+            report=lambda step, left: report(min(np.log(left) / np.log(rtol), 1.0) if left < 1.0 else 0.0),
+        )
+    if not found.converged:
+        raise SolverError(f"{len(loads)} equations were not solved: a share of {found.residual:.1g} is left.")
+    return found.values
 
 
-def _ratio(numbers: Floats, others: Floats) -> Floats:
+def _ratio(numbers: Any, others: Any) -> Any:
     """Return quotients; zero where both are zero, as in columns that are solved."""
     return np.divide(numbers, others, out=np.zeros_like(numbers), where=others != 0.0)
 
