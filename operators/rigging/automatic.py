@@ -123,7 +123,7 @@ def _check_objects(obj, armature, names):
     """Refuse an object that cannot follow these bones, before anything is computed."""
     check_bindable(obj, armature)
     taken = [name for name in names if name in obj.data.attributes and not has_group(obj, name)]
-    if taken and obj.type == "MESH":
+    if taken and takes_groups(obj):
         raise PointCloudError(
             f'"{obj.name}" has attributes named {", ".join(taken)}, and vertex groups share their names. Rename these'
             " attributes or bones."
@@ -145,7 +145,8 @@ def _write(obj, names, weights):
 
     Of a point they leave so much to the others that the sum is one.
     """
-    locked = [name for name in names if name in obj.vertex_groups and obj.vertex_groups[name].lock_weight]
+    groups = obj.vertex_groups if takes_groups(obj) else {}
+    locked = [name for name in names if name in groups and groups[name].lock_weight]
     free = np.array([name not in locked for name in names])
     weights = weights[:, free]
     if locked:

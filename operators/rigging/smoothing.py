@@ -16,7 +16,7 @@ from ..tools.select import selected
 from .bones import deforming_bones
 from .limits import influences, least_weight
 from .painting import WeightOperator, in_selecting_mode
-from .weights import MOST, read_weights, weight_names, write_weights
+from .weights import MOST, read_weights, takes_groups, weight_names, write_weights
 
 _SPACINGS = 4.0  # default length, in spacings of the points
 _ONE = 1e-3  # how far from one the sum of normalized weights may be
@@ -112,7 +112,7 @@ class SmoothWeights(Tool):
         edges = None if self.across else _edges(obj)
         _, operator = operator_reader(context, obj)
         length, smooth, settings = self.length, self.smooth, {"fill": self.fill, "least": self.least}
-        most = self.influences or (MOST if obj.type != "MESH" else None)
+        most = self.influences or (None if takes_groups(obj) else MOST)
 
         def compute(progress):
             laplacian = operator(lambda stage, fraction: progress(stage, 0.5 * fraction))
@@ -142,9 +142,9 @@ class SmoothWeights(Tool):
     def _parts(self, obj, names, weights):
         """Return what is smoothed together, and the names of the locked groups among it."""
         every = np.arange(len(names))
-        if obj.type != "MESH":
+        if not takes_groups(obj):
             if self.groups == "ACTIVE":
-                raise PointCloudError(f'"{obj.name}" is a Point Cloud, which has no active group. Choose All.')
+                raise PointCloudError(f'The weights of "{obj.name}" are attributes: no active group. Choose All.')
             none = np.zeros(len(names), dtype=bool)
             return [_Part(every, ~none, none, True)], []
         held = np.array([group.lock_weight for group in obj.vertex_groups])
@@ -174,7 +174,7 @@ class SmoothWeights(Tool):
     def write(self, context, obj, result):
         names, before, after, reach, locked = result
         changed = (after != before).any(axis=0)
-        if obj.type != "MESH":
+        if not takes_groups(obj):
             changed[:] = True  # they are one table
         write_weights(obj, [name for name, new in zip(names, changed, strict=True) if new], after[:, changed])
         notices = [f"Locked vertex groups, left as they are: {', '.join(locked[:5])}."] if locked else []

@@ -13,7 +13,7 @@ from ..objects.attributes import point_count
 from ..registration import Registration, Row
 from .bones import followed_armature
 from .transfer import Transfer, TransferOperator, sides
-from .weights import MOST, has_weights, named, read_weights, weight_names, write_weights
+from .weights import MOST, has_weights, named, read_weights, takes_groups, weight_names, write_weights
 
 
 class Weights(NamedTuple):
@@ -71,9 +71,9 @@ def read(obj) -> Weights:
     there = has_weights(obj)
     names = weight_names(obj) if there else []
     table = read_weights(obj) if there else np.zeros((point_count(obj.data), 0))
-    active = obj.vertex_groups.active if obj.type == "MESH" else None
+    active = obj.vertex_groups.active if takes_groups(obj) else None
     bones = names
-    if obj.type == "MESH":
+    if takes_groups(obj):
         armature = followed_armature(obj)
         deforming = {bone.name for bone in armature.data.bones if bone.use_deform} if armature is not None else ()
         bones = [name for name in names if name in deforming]
@@ -133,7 +133,7 @@ class TransferWeights(Transfer):
         bones = {name for values in (*given, own) for name in values.bones}
         others = [name for name in own.names if name in bones and name not in names]
         every = [*names, *others]
-        groups = obj.vertex_groups if obj.type == "MESH" else {}
+        groups = obj.vertex_groups if takes_groups(obj) else {}
         locked = [name for name in every if name in groups and groups[name].lock_weight]
         _check_groups(obj, names, locked)
 
@@ -148,7 +148,7 @@ class TransferWeights(Transfer):
         _, find = self.matcher(context, obj, sources, members)
         preview, before = self.preview, own.columns(every)
         moved = [name for name in every if name not in stay and (name not in kept or normalized)]
-        written = moved if obj.type == "MESH" else every  # a point cloud has one table of all
+        written = moved if takes_groups(obj) else every  # else they are one table
         emptied = [name for name in others if name not in (*kept, *stay)]
         notices = [
             *named(locked, "Locked vertex groups, left as they are"),
@@ -206,7 +206,7 @@ class TransferWeights(Transfer):
         if self.preview:
             return texts
         notices = list(result.notices)
-        if obj.type != "MESH":
+        if not takes_groups(obj):
             many = np.count_nonzero(np.count_nonzero(result.table > 0.0, axis=1) > MOST)
             if many:
                 notices.append(f"Points that would follow more than {MOST} bones, and keep the largest: {many:,}.")
@@ -220,7 +220,7 @@ def _check_groups(obj, names, locked):
         told = named(names, f'All groups of "{obj.name}" that would be taken are locked')
         raise PointCloudError(f"{' '.join(told)} Unlock some.")
     taken = [name for name in names if name in obj.data.attributes and name not in obj.vertex_groups]
-    if obj.type == "MESH" and taken:
+    if takes_groups(obj) and taken:
         raise PointCloudError(
             f'"{obj.name}" has attributes named {", ".join(taken)}, and vertex groups share their names. Rename these'
             " attributes."

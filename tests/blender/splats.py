@@ -29,8 +29,8 @@ def bar_splats(core, degree=3):
     )
 
 
-def add_splats(splats, name="Splats"):
-    """Add an active, selected object of splats: a point cloud where Blender makes one of a mesh."""
+def add_splats(splats, name="Splats", as_mesh=False):
+    """Add an active, selected object of splats: a point cloud where Blender makes one of a mesh, and that is wanted."""
     mesh = bpy.data.meshes.new(name)
     mesh.vertices.add(len(splats))
     mesh.attributes["position"].data.foreach_set("vector", splats.positions.ravel())
@@ -46,7 +46,7 @@ def add_splats(splats, name="Splats"):
     for other in bpy.context.view_layer.objects:
         other.select_set(other == obj)
     bpy.context.view_layer.objects.active = obj
-    if bpy.app.version >= (4, 5):
+    if bpy.app.version >= (4, 5) and not as_mesh:
         assert bpy.ops.object.convert(target="POINTCLOUD") == {"FINISHED"}
         obj = bpy.context.object
     return obj

@@ -11,6 +11,7 @@ from tests.blender.armatures import add_armature, weights_of
 from tests.blender.clouds import add_group, add_object, differences, everything, grid_points
 from tests.blender.conftest import part
 from tests.blender.operators import refused
+from tests.blender.splats import add_splats, bar_splats
 from tests.blender.test_pointcloud import add_pointcloud
 
 COLUMNS, ROWS = 48, 20
@@ -160,6 +161,19 @@ def test_a_point_cloud():
     table.write_weights(obj, ["left", "right"], np.column_stack([X < 0.0, X > 0.0]).astype(float))
     bpy.ops.meshfree.smooth_weights(length=LENGTH, least=0.0)
     assert_allclose(table.read_weights(obj)[:, 1], SOFT, atol=0.015)
+    with refused(obj, "no active group"):
+        bpy.ops.meshfree.smooth_weights(groups="ACTIVE")
+
+
+def test_splats_of_a_mesh(core):
+    """They are no point cloud before Blender 4.5, and their weights are a table there, too."""
+    rest = bar_splats(core)
+    obj, height = add_splats(rest, as_mesh=True), rest.positions[:, 2] - np.median(rest.positions[:, 2])
+    add_group(obj, "Handle", height > 0.0)
+    table = part("operators.rigging.weights")
+    table.write_weights(obj, ["left", "right"], np.column_stack([height < 0.0, height > 0.0]).astype(float))
+    assert bpy.ops.meshfree.smooth_weights(length=LENGTH, least=0.0) == {"FINISHED"}
+    assert_allclose(table.read_weights(obj)[:, 1], step(height), atol=0.03)
     with refused(obj, "no active group"):
         bpy.ops.meshfree.smooth_weights(groups="ACTIVE")
 

@@ -8,6 +8,7 @@ from tests.blender.armatures import add_armature, weights_of
 from tests.blender.clouds import add_group, add_object, attribute, everything, sphere_points
 from tests.blender.conftest import part
 from tests.blender.operators import refused
+from tests.blender.splats import add_splats
 from tests.blender.test_panel import draw
 from tests.blender.test_pointcloud import add_pointcloud
 
@@ -248,6 +249,27 @@ def test_to_a_point_cloud_and_back(pair):
     assert weights.weight_names(cloud) == list(BONES)
     assert np.abs(weights.read_weights(cloud) - height(positions(cloud))).max() < 0.02
     choose(cloud, target)
+    bpy.ops.meshfree.transfer_weights(groups="DEFORM")
+    assert np.abs(weights_of(target) - height(positions(target))).max() < 0.04
+
+
+def test_to_splats_of_a_mesh_and_back(pair, core):
+    """Their vertex groups are no weights of bones, nor locked ones of such names."""
+    source, target = pair
+    weights, points = part("operators.rigging.weights"), sphere_points(600, seed=9).astype(np.float32)
+    one, three = np.ones(len(points), np.float32), np.full((len(points), 3), 0.05, np.float32)
+    turns = np.tile(np.float32([1.0, 0.0, 0.0, 0.0]), (len(points), 1))
+    empty = np.zeros((len(points), 0, 3), np.float32)
+    cloud = add_splats(core.splats.Splats(points, three, turns, one, three, empty), as_mesh=True)
+    add_group(cloud, "upper", np.arange(9))
+    cloud.vertex_groups["upper"].lock_weight = True
+    choose(source, cloud)
+    assert bpy.ops.meshfree.transfer_weights() == {"FINISHED"}
+    assert weights.weight_names(cloud) == list(BONES)
+    assert np.abs(weights.read_weights(cloud) - height(positions(cloud))).max() < 0.02
+    choose(cloud, target)
+    with refused(target, "no active vertex group"):
+        bpy.ops.meshfree.transfer_weights(groups="ACTIVE")
     bpy.ops.meshfree.transfer_weights(groups="DEFORM")
     assert np.abs(weights_of(target) - height(positions(target))).max() < 0.04
 
