@@ -15,7 +15,7 @@ def _modules():
     from .operators import rigging, tools
     from .operators.deform import bake, deleted, handle_kind, live
     from .operators.deform import tools as deform
-    from .operators.files import command, exporting, importing, tiles
+    from .operators.files import command, exporting, importing, show_splats, tiles
     from .operators.objects import counting, motion, motion_files, notices, settings
     from .operators.running import cache, discs, job
     from .ui import (
@@ -56,6 +56,7 @@ def _modules():
         *_within(rigging),
         importing,
         tiles,
+        show_splats,
         exporting,
         command,
         show,

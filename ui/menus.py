@@ -4,7 +4,7 @@ import bpy
 
 from ..core.files import SCANS
 from ..operators import registration
-from ..operators.files.importing import OWN
+from ..operators.files.importing import DROPPED
 from ..operators.objects.reading import TYPES
 from .panel import draw_tasks
 
@@ -97,12 +97,12 @@ def _draw_export(self, _context):
 
 
 class MESHFREE_FH_points(bpy.types.FileHandler):
-    """Import files that are dropped onto a 3D view, of kinds that Blender does not read by itself"""
+    """Import files dropped onto a 3D view; where Blender or Point Tiles read them, too, a menu offers both"""
 
     bl_idname = "MESHFREE_FH_points"
     bl_label = "Points"
     bl_import_operator = "meshfree.import_points"
-    bl_file_extensions = ";".join(OWN)
+    bl_file_extensions = ";".join(DROPPED)
 
     @classmethod
     def poll_drop(cls, context):

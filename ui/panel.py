@@ -9,7 +9,7 @@ from ..operators.objects.colors import own_colors, own_material, shows_own_mater
 from ..operators.objects.modifiers import has_input, input_property, is_own, is_sequence
 from ..operators.objects.reading import TYPES, obstacle, sharing_objects
 from ..operators.objects.result import area_text, is_analyzed, is_stale, is_trusted, read_eigenvalues
-from ..operators.objects.splats import LEFT_BEHIND, are_left_behind, has_splats
+from ..operators.objects.splats import LEFT_BEHIND, are_left_behind, has_splats, holds_columns
 from ..operators.running.application import ApplicationOperator
 from ..operators.running.job import running
 from ..tools.quantities import APPLICATIONS, DEVIATION, RESULTS, eigenvector_name, quantity
@@ -102,12 +102,11 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
                 layout.operator("meshfree.import_points", text="Import Points...", icon="IMPORT")
                 layout.operator("meshfree.import_tiles", text="Import Tiles...")
             return
+        _draw_look(layout, obj)
         _draw_summary(layout, context, obj)
         _draw_notices(layout, context, obj)
         if has_splats(obj.data):
             _draw_splats(layout, context, obj)
-        elif DISC not in obj.data.attributes:
-            layout.operator("meshfree.show_surface")
         row = beside_or_below(layout, context, "Analyze Points", "Modes 100")
         row.operator("meshfree.analyze").modes = obj.meshfree.modes
         row.prop(obj.meshfree, "modes")
@@ -165,7 +164,7 @@ def _draw_followers(layout, context):
     for other in chosen:
         column = layout.column()
         column.context_pointer_set("object", other)  # whose notices are dismissed
-        draw_text(column, context, f"{other.name}: {point_count(other.data):,} points", f"OUTLINER_OB_{other.type}")
+        draw_text(column, context, _counted(other), f"OUTLINER_OB_{other.type}")
         _draw_notices(column, context, other)
 
 
@@ -208,10 +207,24 @@ def _draw_result(layout, context, result):
         layout.operator("meshfree.select_left_out").edit_mode = True
 
 
+def _counted(obj):
+    """Return the name of an object, and how many points or splats it has."""
+    return f"{obj.name}: {point_count(obj.data):,} {'splats' if has_splats(obj.data) else 'points'}"
+
+
+def _draw_look(layout, obj):
+    """Draw the button by which loose points are seen as what they are, such as those of Blender's own importers."""
+    data = obj.data
+    if holds_columns(data):
+        layout.operator("meshfree.show_splats", icon="SHADING_RENDERED")
+    elif not has_splats(data) and DISC not in data.attributes and not (obj.type == "MESH" and data.polygons):
+        layout.operator("meshfree.show_surface", icon="SHADING_SOLID")
+
+
 def _draw_summary(layout, context, obj):
     mesh = obj.data
     column = layout.column(align=True)
-    draw_text(column, context, f"{obj.name}: {point_count(mesh):,} points", f"OUTLINER_OB_{obj.type}")
+    draw_text(column, context, _counted(obj), f"OUTLINER_OB_{obj.type}")
     if obj.type == "MESH" and mesh.polygons:
         draw_text(column, context, f"Faces not used: {len(mesh.polygons):,}", "INFO")
     scale = obj.matrix_world.to_scale()

@@ -145,9 +145,32 @@ def _refuse(path: Path) -> NoReturn:
     )
 
 
+def from_columns(columns: dict[str, Array], name: str) -> Splats:
+    """Return the splats of columns for which `hold_enough` holds, as of a PLY file that another program has read.
+
+    Parameters
+    ----------
+    columns : dict of str to ndarray, (n,)
+        By the names of the properties.
+    name : str
+        Of their object, for notices and errors.
+
+    Raises
+    ------
+    InvalidPointsError
+        No splat has finite numbers.
+    """
+    path = Path(name)
+    return _from_vertices(_completed(PlyVertices(columns, None, [], []), path), path)
+
+
 def _read_ply(path: Path) -> PlyVertices:
     """Read a PLY file as columns of trainers."""
-    vertices = read_vertex_columns(path)
+    return _completed(read_vertex_columns(path), path)
+
+
+def _completed(vertices: PlyVertices, path: Path) -> PlyVertices:
+    """Add the columns that are missing of those of trainers, with notices."""
     columns, guesses = completed(vertices.columns)
     notices = [f"{path.name}: {'; '.join(guesses)}. write_splats writes the common layout."] if guesses else []
     notices += [f"{path.name}: {text}" for text in remarks(list(vertices.columns))]

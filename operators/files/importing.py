@@ -33,9 +33,7 @@ from .objects import add_object, file_filter
 from .sequence import add_sequence
 from .splats import add_splats, is_drawn, mark
 
-OWN = tuple(
-    suffix for suffix in (*READABLE, *SPLATS) if suffix not in (".ply", ".obj")
-)  # which Blender reads itself, too
+DROPPED = tuple(suffix for suffix in (*READABLE, *SPLATS) if suffix != ".obj")  # which are meshes nearly always
 
 _QUICK = 80_000  # points whose discs take less than two seconds
 _DRAWN = 200_000  # splats whose ellipsoids are drawn at once
@@ -90,6 +88,12 @@ class MESHFREE_OT_import_points(ImportOperator, bpy.types.Operator):
         scans = ("classes", "withheld", "meters") if suffixes & {*SCANS} else ()
         text = ("columns",) if suffixes & {"", *TEXTS} else ()
         return "up", "kind", "attributes", *text, *scans, "surface", *sequence, "frame"
+
+    def invoke(self, context, event):
+        if self.properties.is_property_set("filepath") and {path.suffix.lower() for path in self.chosen()} == {".ply"}:
+            self._attended = True  # a menu has asked where files are dropped that Blender reads, too: no dialog besides
+            return self.execute(context)
+        return super().invoke(context, event)
 
     @reporting
     def execute(self, context):

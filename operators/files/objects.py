@@ -161,7 +161,7 @@ def point_table(context, obj, attributes="ALL", with_colors=True) -> PointTable:
     if np.ndim(table.attributes.get(SCANNER)) == 2:
         table.attributes[SCANNER] = table.attributes[SCANNER].astype(np.float64) @ matrix.T + place_of(obj)
     if with_colors:
-        table.colors = _read_colors(data)
+        table.colors = read_colors(data)
     return table
 
 
@@ -178,8 +178,8 @@ def _world_normals(normals, matrix):
     return (world / np.where(length > 0.0, length, 1.0)).astype(np.float32)
 
 
-def _read_colors(data):
-    """Read the active color attribute of a mesh, or else the first one on points, (n, 4); None without one."""
+def read_colors(data):
+    """Read the colors of points, of sRGB, (n, 4); None without any. See `own_colors`."""
     name = own_colors(data)
     if not name:
         return None

@@ -8,8 +8,20 @@ import numpy as np
 from ... import core
 from ...command.clouds import with_columns
 from ...core.files import choose_origin
+from ...core.files.table import NORMAL
 from ...tools.quantities import PREFIX
-from ..objects.attributes import ONLY_DRAWN, STORABLE, read_attribute, write_attribute
+from ..objects.attributes import (
+    ONLY_DRAWN,
+    STORABLE,
+    has_vectors,
+    own_positions,
+    point_count,
+    read_attribute,
+    remove_attributes,
+    tag_changed,
+    write_attribute,
+)
+from ..objects.deleting import keep_points
 from ..objects.place import OFFSET, place_of
 from ..objects.splat_file import (
     OWN_OFFSET,
@@ -21,9 +33,11 @@ from ..objects.splat_file import (
     with_digits,
     write_places,
 )
-from ..objects.splats import BASE, HARMONIC, ROTATION, SCALE, growth, remember_places, shown_splats
-from .objects import add_column
+from ..objects.splats import BASE, HARMONIC, ROTATION, SCALE, column_names, growth, remember_places, shown_splats
+from .objects import add_column, read_colors
 
+_NORMALS = ("nx", "ny", "nz")  # columns
+_NUMBER = ".number"  # a column beside those of a file: which point it is
 _TYPE = "GAUSSIAN_SPLAT"  # of point clouds, from Blender 5.3 on
 _UPRIGHT = {
     "Z": 0,
@@ -56,19 +70,59 @@ def add_splats(name, splats, collection, known=None, up="Z"):
     obj = bpy.data.objects.new(name, mesh)
     obj.rotation_euler.x = _UPRIGHT[up] * 0.5 * np.pi
     _write_shifted(obj, splats.positions.astype(np.float64), _rotation(_UPRIGHT[up]), known)
-    remember_places(mesh)
-    write_attribute(mesh, SCALE, splats.scales, "FLOAT_VECTOR")
-    write_attribute(mesh, ROTATION, splats.rotations, "QUATERNION")
-    kinds = bpy.types.Attribute.bl_rna.properties["data_type"].enum_items
-    base = np.column_stack([splats.colors, splats.opacities])
-    write_attribute(mesh, BASE, base, "FLOAT4" if "FLOAT4" in kinds else "FLOAT_COLOR")
-    for number in range(splats.harmonics.shape[1]):
-        write_attribute(mesh, f"{HARMONIC}{number}", splats.harmonics[:, number], "FLOAT_VECTOR")
-    if splats.file is not None:
-        _keep_file(obj, splats)
+    _write(obj, splats)
     mesh.update()
     collection.objects.link(obj)
     return obj
+
+
+def _write(obj, splats):
+    """Write the attributes of splats, whose places are those of the points, and what their file holds besides."""
+    data = obj.data
+    remember_places(data)
+    write_attribute(data, SCALE, splats.scales, "FLOAT_VECTOR")
+    write_attribute(data, ROTATION, splats.rotations, "QUATERNION")
+    kinds = bpy.types.Attribute.bl_rna.properties["data_type"].enum_items
+    base = np.column_stack([splats.colors, splats.opacities])
+    write_attribute(data, BASE, base, "FLOAT4" if "FLOAT4" in kinds else "FLOAT_COLOR")
+    for number in range(splats.harmonics.shape[1]):
+        write_attribute(data, f"{HARMONIC}{number}", splats.harmonics[:, number], "FLOAT_VECTOR")
+    if splats.file is not None:
+        _keep_file(obj, splats)
+
+
+def splats_of_columns(obj):
+    """Return the splats whose columns in a file the points of an object have as attributes; see `holds_columns`.
+
+    Returns
+    -------
+    Splats
+        With notices of what was guessed or left out.
+    ndarray, (n,) bool
+        Which points they are: those of finite numbers.
+    """
+    data = obj.data
+    columns = dict(zip("xyz", own_positions(data).T, strict=True))
+    if has_vectors(data, NORMAL):  # which Blender makes of three columns
+        columns |= dict(zip(_NORMALS, read_attribute(data, NORMAL).T, strict=True))
+    columns |= {name: read_attribute(data, name) for name in column_names(data)}
+    colors = read_colors(data)
+    if colors is not None and not columns.keys() & {"f_dc_0", "red"}:  # which Blender has made of these
+        values = np.rint(255.0 * colors[:, :3]).astype(np.uint8)
+        columns |= dict(zip(("red", "green", "blue"), values.T, strict=True))
+    number = np.arange(point_count(data))
+    splats = core.splats.from_columns({**columns, _NUMBER: number}, obj.name)
+    kept = np.isin(number, splats.file.columns.pop(_NUMBER))
+    return splats, kept
+
+
+def write_in_place(context, obj, splats, kept):
+    """Let those points of an object that are kept, (n,) bool, be splats instead of points with columns."""
+    if not kept.all():
+        keep_points(context, obj, kept)
+    remove_attributes(obj.data, *splats.file.columns, NORMAL)
+    _write(obj, splats)
+    tag_changed(obj.data)
 
 
 def _rotation(quarters):

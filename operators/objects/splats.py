@@ -7,7 +7,7 @@ import numpy as np
 
 from ... import core
 from ...core import PointCloudError
-from ...tools.quantities import DISPLACEMENT
+from ...tools.quantities import DISPLACEMENT, PREFIX
 from .attributes import (
     REST,
     SPLAT_HARMONIC,
@@ -30,6 +30,8 @@ LEFT_BEHIND = (
 _MOST_STEPS = 32  # different translations of splats: more of them mean rotation or scaling
 _STEP = 1e-5  # of the largest coordinate: smaller steps count as equal
 _GLANCE = 4000  # splats that a panel checks
+_FIRST = "scale_0"  # column that all files of splats have
+_NUMBERS = ("FLOAT", "INT")  # types of columns
 _TYPES = {SCALE: ("FLOAT_VECTOR",), ROTATION: ("QUATERNION",), BASE: ("FLOAT4", "FLOAT_COLOR")}
 
 
@@ -39,6 +41,22 @@ def has_splats(data) -> bool:
         name in data.attributes and data.attributes[name].data_type in types and data.attributes[name].domain == "POINT"
         for name, types in _TYPES.items()
     )
+
+
+def column_names(data) -> list:
+    """Return the names of the attributes of points that may be columns of a file: numbers, and no results."""
+    return [
+        item.name
+        for item in data.attributes
+        if item.domain == "POINT" and item.data_type in _NUMBERS and not item.name.startswith((".", PREFIX))
+    ]
+
+
+def holds_columns(data) -> bool:
+    """Whether attributes of points are the columns of a file of splats, as Blender's importer of PLY leaves them."""
+    if _FIRST not in data.attributes or has_splats(data):
+        return False
+    return core.splats.hold_enough((*"xyz", *column_names(data)))
 
 
 def harmonic_names(data) -> list:

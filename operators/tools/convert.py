@@ -54,44 +54,50 @@ class MESHFREE_OT_convert(ReadyOperator, bpy.types.Operator):
             kind = "point cloud" if self.target == "POINTCLOUD" else "mesh"
             raise PointCloudError(f'"{context.object.name}" is a {kind} already.')
         for obj in objects:
-            _check(obj)
-        shown = context.view_layer.objects
-        active, chosen = shown.active and shown.active.name, [obj.name for obj in context.selected_objects]
-        kept = {obj: obj.copy() for obj in objects}
-        try:
-            with all_or_nothing([]):
-                left = self._convert_all(context, kept)
-            bpy.data.batch_remove([*kept.values(), *left])
-        finally:
-            for obj in shown:
-                obj.select_set(obj.name in chosen)
-            shown.active = shown[active] if active else None
+            check_convertible(obj)
+        for line in convert(context, objects, self.target):
+            self.report({"INFO"}, line)
         return {"FINISHED"}
 
-    def _convert_all(self, context, kept):
-        """Convert objects, and return data that become unused; if it fails, replace them by the copies."""
-        names, left = [obj.name for obj in kept], {obj.data for obj in kept}
-        try:
-            for obj in kept:
-                if obj.meshfree.make_single_user and obj.data.users > 2:  # one of them is the copy
-                    obj.data = obj.data.copy()
-                left.add(obj.data)
-                made = _convert(context, obj, self.target)
-                self.report(
-                    {"INFO"}, f"{obj.name}: {point_count(obj.data):,} points are a {obj.type.lower()} now{made}"
-                )
-            used = {obj.data for obj in bpy.data.objects if obj not in kept.values()}
-            return [data for data in left if data not in used and not data.use_fake_user]
-        except BaseException:
-            for obj, copy in kept.items():
-                obj.user_remap(copy)
-            bpy.data.batch_remove(kept)
-            for copy, name in zip(kept.values(), names, strict=True):
-                copy.name = name
-            raise
+
+def convert(context, objects, target) -> list:
+    """Convert objects for which `check_convertible` holds, all or none, and return a line for each."""
+    shown = context.view_layer.objects
+    active, chosen = shown.active and shown.active.name, [obj.name for obj in context.selected_objects]
+    kept = {obj: obj.copy() for obj in objects}
+    try:
+        with all_or_nothing([]):
+            lines, left = _convert_all(context, kept, target)
+        bpy.data.batch_remove([*kept.values(), *left])
+    finally:
+        for obj in shown:
+            obj.select_set(obj.name in chosen)
+        shown.active = shown[active] if active else None
+    return lines
 
 
-def _check(obj):
+def _convert_all(context, kept, target):
+    """Convert objects, and return lines, and data that become unused; if it fails, replace them by the copies."""
+    names, left, lines = [obj.name for obj in kept], {obj.data for obj in kept}, []
+    try:
+        for obj in kept:
+            if obj.meshfree.make_single_user and obj.data.users > 2:  # one of them is the copy
+                obj.data = obj.data.copy()
+            left.add(obj.data)
+            made = _convert(context, obj, target)
+            lines.append(f"{obj.name}: {point_count(obj.data):,} points are a {obj.type.lower()} now{made}")
+        used = {obj.data for obj in bpy.data.objects if obj not in kept.values()}
+        return lines, [data for data in left if data not in used and not data.use_fake_user]
+    except BaseException:
+        for obj, copy in kept.items():
+            obj.user_remap(copy)
+        bpy.data.batch_remove(kept)
+        for copy, name in zip(kept.values(), names, strict=True):
+            copy.name = name
+        raise
+
+
+def check_convertible(obj):
     """Refuse an object that would lose data."""
     check_writable(obj, (), obj.meshfree.make_single_user)
     if obj.meshfree.deform.is_bound:

@@ -1,4 +1,4 @@
-"""Tools for Gaussian splats: display, applying transforms, joining."""
+"""Tools for Gaussian splats: applying transforms, joining."""
 
 import bpy
 import numpy as np
@@ -9,7 +9,6 @@ from ...core import PointCloudError
 from ...core.files import is_coarse
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import point_count, read_attribute, write_attribute
-from ..objects.handlers import notify
 from ..objects.modifiers import is_deform
 from ..objects.place import OFFSET, offset_of
 from ..objects.positions import check_movable
@@ -40,25 +39,14 @@ _ROUNDING = 1e-12  # of products of matrices
 class SplatOperator(ReadyOperator):
     """An operator on the splats of the active object."""
 
+    takes = staticmethod(has_splats)  # whether it works on the data of an object
+
     @classmethod
     def obstacle(cls, context):
         reason = super().obstacle(context)
-        if reason or has_splats(context.object.data):
+        if reason or cls.takes(context.object.data):
             return reason
         return f'"{context.object.name}" holds no Gaussian splats. Import a file of splats'
-
-
-class MESHFREE_OT_show_splats(SplatOperator, bpy.types.Operator):
-    """Draw Gaussian splats as ellipsoids in their own colors"""
-
-    bl_idname = "meshfree.show_splats"
-    bl_label = "Show Splats"
-
-    @reporting
-    def execute(self, context):
-        with all_or_nothing([context.object]):
-            notify("splats_found", context.object)
-        return {"FINISHED"}
 
 
 class MESHFREE_OT_apply_to_splats(SplatOperator, bpy.types.Operator):
@@ -238,7 +226,6 @@ def _remove(context, objects):
 
 
 TOOLS = (
-    Registration(MESHFREE_OT_show_splats, panel=Row("Splats", 1, 1), menu=Row("Object", 1, 2)),
     Registration(MESHFREE_OT_apply_to_splats, panel=Row("Splats", 1, 3), menu=Row("Object", 10, 1)),
     Registration(MESHFREE_OT_join_splats, panel=Row("Splats", 1, 4), menu=Row("Object", 10, 2)),
 )

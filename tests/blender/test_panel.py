@@ -198,12 +198,29 @@ def test_panel_of_a_new_object():
     assert "Total Area" not in texts
 
 
+def test_the_first_button_shows_points_of_other_importers_as_what_they_are(tmp_path, core):
+    splat_files.write_ply(tmp_path / "a.ply", splat_files.some_columns(50))
+    bpy.ops.wm.ply_import(filepath=str(tmp_path / "a.ply"))
+    assert draw()[:2] == ["Show as Splats", "a: 50 points"]
+    bpy.ops.meshfree.show_splats()
+    assert draw()[0] == "a: 50 splats"
+    bpy.context.object.select_set(False)
+    obj = add_object(sphere_points())
+    assert draw()[:2] == ["Show as Surface", "Cloud: 1,000 points"]
+    bpy.ops.meshfree.show_surface()
+    assert draw()[0] == "Cloud: 1,000 points"
+    obj.data.attributes.remove(obj.data.attributes["lb_disc"])
+    obj.data.clear_geometry()
+    obj.data.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+    assert "Show as Surface" not in draw()  # Blender shows its faces
+
+
 def test_panel_of_splats_has_what_is_for_them(core):
     add_object(sphere_points())
-    assert "Show Splats" not in draw()
+    assert "Show as Splats" not in draw()
     add_splats(bar_splats(core))
     names = {
-        "Show Splats",
+        "Show as Splats",
         "Select Floaters",
         "Apply Transform to Splats",
         "Join Splats",

@@ -6,6 +6,9 @@ import pytest
 from mathutils import Matrix
 
 from tests import splat_files
+from tests.blender.clouds import attribute, everything
+from tests.blender.conftest import part
+from tests.blender.operators import refused
 from tests.blender.splats import read
 from tests.blender.test_command import run  # noqa: F401
 
@@ -37,8 +40,8 @@ def test_other_kinds_become_splats_and_are_written_as_ply(core, tmp_path, name):
     obj = imported(tmp_path / name)
     np.testing.assert_array_equal(read(obj.data, "scale"), wanted.scales.astype(np.float32))
     found = exported(core, tmp_path / "back.ply")
-    for part in ("positions", "scales", "rotations", "opacities", "colors"):
-        np.testing.assert_array_equal(getattr(found, part), getattr(wanted, part))
+    for name in ("positions", "scales", "rotations", "opacities", "colors"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(wanted, name))
 
 
 @pytest.mark.parametrize("missing", [("scale_2",), ("f_dc_0", "f_dc_1", "f_dc_2")])
@@ -160,3 +163,118 @@ def read_values(data, name):
     values = np.empty(len(data.attributes[name].data), np.float32)
     data.attributes[name].data.foreach_get("value", values)
     return values
+
+
+class TestImportedByBlender:
+    """Files that Blender's own importer has read: points with numbers, until one click."""
+
+    @pytest.fixture(params=[0, 3, 8, 15])
+    def files(self, request, tmp_path):
+        """A file as trainers write it, as both importers know it: our object, and Blender's, the active one."""
+        columns = splat_files.some_columns(60, harmonics=request.param)
+        normals = {name: np.random.default_rng(2).standard_normal(60).astype(np.float32) for name in ("nx", "ny", "nz")}
+        columns = {**{axis: columns[axis] for axis in "xyz"}, **normals, **columns}
+        splat_files.write_ply(tmp_path / "a.ply", columns)
+        ours = imported(tmp_path / "a.ply")
+        assert bpy.ops.wm.ply_import(filepath=str(tmp_path / "a.ply")) == {"FINISHED"}
+        return tmp_path, ours, bpy.context.object
+
+    def test_they_become_what_import_points_makes_of_them(self, files):
+        folder, ours, obj = files
+        obj.location, obj.rotation_euler = (1.0, 2.0, 3.0), (0.3, 0.2, 0.1)
+        bpy.context.view_layer.update()
+        matrix = obj.matrix_world.copy()
+        assert bpy.ops.meshfree.show_splats() == {"FINISHED"}
+        assert (obj.type, obj.matrix_world, bpy.context.object) == (ours.type, matrix, obj)
+        bpy.ops.meshfree.export_splats(filepath=str(folder / "moved.ply"))
+        assert attributes_of(obj.data) == attributes_of(ours.data)
+        assert obj["lb_splat_format"] == ours["lb_splat_format"]
+        assert drawn_by(obj) == drawn_by(ours)
+        obj.matrix_world = Matrix()
+        bpy.ops.meshfree.export_splats(filepath=str(folder / "b.ply"))
+        assert (folder / "b.ply").read_bytes() == (folder / "a.ply").read_bytes()
+        assert [mesh for mesh in bpy.data.meshes if obj.type != "MESH" and mesh.users == 0] == []
+
+    def test_one_undo_takes_it_back(self, files):
+        *_, obj = files
+        before, name = everything(obj), obj.name
+        bpy.ops.ed.undo_push(message="Before")
+        assert bpy.ops.meshfree.show_splats("EXEC_DEFAULT", True) == {"FINISHED"}
+        bpy.ops.ed.undo()
+        assert everything(bpy.data.objects[name]) == before
+
+    @staticmethod
+    def by_blender(folder, columns):
+        splat_files.write_ply(folder / "b.ply", columns)
+        bpy.ops.wm.ply_import(filepath=str(folder / "b.ply"))
+        return bpy.context.object
+
+    def test_those_that_are_not_finite_are_left_out(self, tmp_path):
+        """Blender reads 0 for what is not finite; others do not."""
+        columns = splat_files.some_columns(50)
+        obj = self.by_blender(tmp_path, columns)
+        obj.data.attributes["opacity"].data.foreach_set("value", np.where(np.arange(50) < 3, np.nan, 0.0))
+        bpy.ops.meshfree.show_splats()
+        np.testing.assert_array_equal(read(obj.data, "position"), np.stack([columns[k][3:] for k in "xyz"], axis=1))
+        np.testing.assert_allclose(read(obj.data, "scale")[:, 0], np.exp(columns["scale_0"][3:]), rtol=1e-6)
+        assert "left out 3 splats" in obj.meshfree.notices[0].text
+
+    def test_colors_that_blender_has_read(self, tmp_path, core):
+        columns = {name: values for name, values in splat_files.some_columns(50).items() if not name.startswith("f_")}
+        bytes_ = np.random.default_rng(1).integers(0, 256, (3, 50)).astype(np.uint8)
+        obj = self.by_blender(tmp_path, columns | dict(zip(("red", "green", "blue"), bytes_, strict=True)))
+        bpy.ops.meshfree.show_splats()
+        wanted = core.splats.read_splats(tmp_path / "b.ply")
+        np.testing.assert_array_equal(read(obj.data, "radiance:base")[:, :3], wanted.colors.astype(np.float32))
+
+    def test_results_and_groups_stay(self, tmp_path):
+        obj = self.by_blender(tmp_path, splat_files.some_columns(50))
+        obj.data.attributes.new("lb_field", "FLOAT", "POINT").data.foreach_set("value", np.arange(50.0))
+        obj.vertex_groups.new(name="Handle").add(range(5), 1.0, "REPLACE")
+        bpy.ops.meshfree.show_splats()
+        np.testing.assert_array_equal(attribute(obj, "lb_field"), np.arange(50))
+        assert part("operators.objects.groups").group_weights(obj, "Handle").sum() == 5.0
+
+    def test_what_would_be_lost_is_refused(self, tmp_path):
+        obj = self.by_blender(tmp_path, splat_files.some_columns(50))
+        other = obj.copy()
+        bpy.context.scene.collection.objects.link(other)
+        with refused(obj, "shares its mesh.*Make Single User"):
+            bpy.ops.meshfree.show_splats()
+        obj.meshfree.make_single_user = True
+        obj.modifiers.new("Bend", "SIMPLE_DEFORM")
+        with refused(obj, "has modifiers .Bend.. Apply or remove"):
+            bpy.ops.meshfree.show_splats()
+        obj.modifiers.clear()
+        before = attributes_of(other.data)
+        bpy.ops.meshfree.show_splats()
+        assert attributes_of(other.data) == before
+
+    def test_plain_points_are_no_splats(self, tmp_path):
+        columns = {name: values for name, values in splat_files.some_columns(50).items() if name[:4] != "rot_"}
+        obj = self.by_blender(tmp_path, {name: columns[name] for name in (*"xyz", "scale_0", "scale_2", "opacity")})
+        with refused(obj, "holds no Gaussian splats"):
+            bpy.ops.meshfree.show_splats()
+
+
+def attributes_of(data):
+    """Types and values of all attributes but the selection of points, which differ between importers."""
+    return {
+        item.name: (item.data_type, item.domain, list(map(tuple_of, item.data)))
+        for item in data.attributes
+        if not item.name.startswith((".sel", ".edge", ".corner", "sharp"))
+    }
+
+
+def tuple_of(item):
+    value = next(getattr(item, key) for key in ("vector", "color", "value") if hasattr(item, key))
+    return value if isinstance(value, (bool, int, float)) else tuple(value)
+
+
+def drawn_by(obj):
+    """What the display of an object is given, but for the material, of which we compare the nodes."""
+    (modifier,) = obj.modifiers
+    inputs = part("operators.objects.modifiers").inputs_of(modifier)
+    material = next(value for value in inputs.values() if isinstance(value, bpy.types.Material))
+    plain = {name: value for name, value in inputs.items() if value != material}
+    return modifier.node_group, plain, material["meshfree_kind"]

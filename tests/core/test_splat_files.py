@@ -217,6 +217,18 @@ class TestLengths:
         assert found[8] == np.float32(0.25)
 
 
+def test_columns_that_another_program_has_read(tmp_path):
+    """They are what the file is, and are told of by the name of what holds them."""
+    columns = without(splat_files.some_columns(20, harmonics=3), "scale_2")
+    read, given = read_as_trained(tmp_path, columns), core.splats.from_columns(columns, "Bonsai")
+    for name in ("positions", "scales", "rotations", "opacities", "colors", "harmonics"):
+        np.testing.assert_array_equal(getattr(given, name), getattr(read, name))
+    assert given.notices == [text.replace("trained.ply", "Bonsai") for text in read.notices] != []
+    columns["x"][:] = np.nan
+    with pytest.raises(core.InvalidPointsError, match="Bonsai: all 20 splats have numbers that are not finite"):
+        core.splats.from_columns(columns, "Bonsai")
+
+
 def test_far_away_places_are_written_in_double_precision(tmp_path):
     splats = core.splats.Splats(
         positions=np.random.default_rng(0).random((9, 3)) + [437251.0, 5412893.0, 310.0],
