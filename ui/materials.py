@@ -4,9 +4,8 @@ import bpy
 
 from ..operators.objects.attributes import DISC, RISE
 from ..operators.objects.node_trees import TreeBuilder
-from ..operators.objects.splats import BASE
 from . import colormaps
-from .nodes import DEVIATIONS
+from .nodes import DEVIATIONS, OPACITY, TINT
 from .value_range import STEPPED
 
 ATTRIBUTE, RANGE, COLORS = "Attribute", "Range", "Colors"  # nodes of the material that are read again
@@ -29,7 +28,7 @@ _PLAIN, _GRAY = "PLAIN", (0.25, 0.25, 0.25, 1.0)  # where nothing is on show but
 _COLORED = "COLOR"  # where points have colors of their own
 _CHECKERED, _CHECKS = "CHECKER", 20  # along the texture
 CHECKER = {"Even": (0.9, 0.82, 0.6, 1.0), "Odd": (0.02, 0.12, 0.25, 1.0)}  # colors of the checks
-_SPLATTED, _CONSTANT = "SPLATS", 0.28209479  # the harmonic of degree 0
+_SPLATTED, _CONSTANT = "SPLATS BY TINT", 0.28209479  # the harmonic of degree 0
 _GAMMA = 2.2  # makes the steps of direction colours even to the eye
 
 
@@ -61,12 +60,17 @@ def color_plain(material, groups):
         material[_KIND] = kind
 
 
-def color_splats(material):
-    """Let a material show splats in their own colors, fading from their middles, as far as they are opaque."""
+def color_splats(material, mean):
+    """Let a material show splats in their own colors, fading from their middles, as far as they are opaque.
+
+    Solid, which draws no materials but by one color, shows the mean of theirs.
+    """
+    material.diffuse_color = mean
     if material.get(_KIND) == _SPLATTED and material.node_tree is not None:
         return
     tree = new_tree(material)
-    base = tree.node("ShaderNodeAttribute", attribute_name=BASE, name="Splats").outputs  # no result on show
+    base = tree.node("ShaderNodeAttribute", attribute_name=TINT, name="Splats").outputs  # no result on show
+    opacity = tree.node("ShaderNodeAttribute", attribute_name=OPACITY, name="Opacity").outputs["Fac"]
     color = tree.vector("MULTIPLY_ADD", base["Vector"], (_CONSTANT,) * 3, (0.5,) * 3)
     linear = tree.node("ShaderNodeGamma", tree.vector("MAXIMUM", color, (0.0,) * 3), _GAMMA)  # splats are of sRGB
     # A ray that passes the middle of a ball at the share b of its radius meets it at an angle whose sine is b.
@@ -75,7 +79,7 @@ def color_splats(material):
     passed = tree.math("SUBTRACT", 1.0, tree.math("MULTIPLY", facing, facing))
     fading = tree.math("EXPONENT", tree.math("MULTIPLY", passed, -0.5 * DEVIATIONS**2))
     front = tree.math("SUBTRACT", 1.0, place["Backfacing"])
-    alpha = tree.math("MULTIPLY", tree.math("MULTIPLY", fading, base["Alpha"]), front)
+    alpha = tree.math("MULTIPLY", tree.math("MULTIPLY", fading, opacity), front)
     through, light = tree.node("ShaderNodeBsdfTransparent"), tree.node("ShaderNodeEmission", linear)
     tree.output("ShaderNodeOutputMaterial", tree.node("ShaderNodeMixShader", alpha, through, light))
     material[_KIND] = _SPLATTED

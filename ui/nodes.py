@@ -7,7 +7,7 @@ import bpy
 from ..operators.objects.attributes import CORNER, DISC, RISE, SLOPE, SLOPE_2, SLOPE_OF, SOLID, TILT
 from ..operators.objects.modifiers import DISPLAY_TAG, has_input, is_intact, new_group
 from ..operators.objects.node_trees import TreeBuilder
-from ..operators.objects.splats import HARMONIC, ROTATION, SCALE
+from ..operators.objects.splats import BASE, HARMONIC, ROTATION, SCALE
 
 MOST = "Viewport Points"  # input of the display: how many it draws there
 DISCS = "Discs"  # another: whether it draws discs
@@ -27,6 +27,7 @@ _APART = 0.5  # how far strokes are apart, in their lengths
 _LIFTED = 0.2  # how far they lie above the surface, in radii of the points
 _CELLS = 256.0  # of the grid that spreads strokes, along each axis, beyond which it repeats: single precision tells
 _ROUNDING = 1e-5  # share by which values may differ that are the same
+TINT, OPACITY = "lb_tint", "lb_opacity"  # attributes of ellipsoids: the constant harmonic, and how opaque they are
 DEVIATIONS = 2.0  # standard deviations at which the ellipsoid of a splat ends
 _UNSEEN = f"{HARMONIC}*", "ply_*", ".splat_*", "lb_*"  # attributes of splats that do not show
 
@@ -223,6 +224,9 @@ def _ellipsoids(tree, points):
     """Add the nodes that make splats into ellipsoids of two standard deviations; return what is drawn."""
     for names in _UNSEEN:  # or each corner would get a copy
         points = _without(tree, points, names)
+    base = tree.attribute(BASE, "FLOAT_COLOR")
+    points = tree.store(points, OPACITY, tree.node("FunctionNodeSeparateColor", base).outputs["Alpha"], "FLOAT")
+    points = _without(tree, tree.store(points, TINT, base), BASE)  # which Solid would take for colors, and draw black
     ball = tree.node("GeometryNodeMeshIcoSphere", DEVIATIONS, 1)
     placed = tree.node(
         "GeometryNodeInstanceOnPoints",

@@ -17,12 +17,12 @@ from ..operators.objects.attributes import (
     positions_now,
     read_attribute,
 )
-from ..operators.objects.colors import is_color, own_colors, own_material
+from ..operators.objects.colors import is_color, own_colors, own_material, splat_colors
 from ..operators.objects.groups import handle_names, has_group
 from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set_input
 from ..operators.objects.reading import TYPES, sharing_objects, spacing
-from ..operators.objects.splats import has_splats
+from ..operators.objects.splats import BASE, has_splats
 from ..operators.running.discs import renew_discs
 from ..tools.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, HIGH, LOW, ROLES
 from ..tools.quantities import MEAN_CURVATURE, STRAY, quantity
@@ -66,6 +66,7 @@ _LINE_WIDTH = 1.0 / 250.0  # of iso lines, in the root of the area
 _SURFACE, _OWN = "<surface>", "<material>"  # what is shown that is no attribute
 _previewed = set()  # views that were in Solid before something was shown that passes, by their pointers
 _noted = {}  # Group Colors of objects in Edit Mode while something is undone, by session_uid
+_UNTOUCHED = (1.0, 1.0, 1.0, 1.0)  # color of objects
 _NO_SPACING = 0.01  # for points too few to have one
 
 
@@ -332,9 +333,13 @@ def _follow_points(obj):
 
 
 def show_splats(obj):
-    """Show splats as ellipsoids in their own colors."""
+    """Show splats as ellipsoids in their own colors; in Solid in the mean of these."""
     _add_display(obj)
-    color_splats(_display_material(obj))
+    colors = splat_colors(obj.data)
+    mean = np.average(colors, axis=0, weights=read_attribute(obj.data, BASE)[:, 3] + 1e-6)
+    color_splats(_display_material(obj), mean)
+    if tuple(obj.color) == _UNTOUCHED:  # which Solid shows by Vertex and by Object
+        obj.color = mean
     obj.meshfree.point_shape = "DISCS"
     resize(obj)
     use_material_preview(bpy.context)

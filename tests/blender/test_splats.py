@@ -290,8 +290,30 @@ class TestDisplay:
         geometry = evaluated.evaluated_geometry() if hasattr(evaluated, "evaluated_geometry") else None
         drawn = geometry.mesh if geometry else evaluated.data
         names = {layer.name for layer in drawn.attributes if layer.domain == "POINT"}
-        assert {"position", "radiance:base"} <= names
+        assert {"position", "lb_tint", "lb_opacity"} <= names
+        assert not drawn.color_attributes  # which Solid would take for colors
         assert not [name for name in names if name.startswith(("ply_", ".splat_", "radiance:sh_"))]
+
+    def test_each_corner_knows_color_and_opacity_of_its_splat(self, core, rest, tmp_path):
+        bpy.ops.meshfree.import_points(filepath=str(kept_in(core, rest, tmp_path)))
+        evaluated = bpy.context.object.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        geometry = evaluated.evaluated_geometry() if hasattr(evaluated, "evaluated_geometry") else None
+        drawn = geometry.mesh if geometry else evaluated.data
+        opacities = [item.value for item in drawn.attributes["lb_opacity"].data]
+        np.testing.assert_allclose(opacities, np.repeat(rest.opacities, 12), rtol=1e-6)
+        np.testing.assert_allclose(read(drawn, "lb_tint"), np.repeat(rest.colors, 12, axis=0), rtol=1e-6)
+
+    def test_solid_has_the_mean_of_their_colors(self, core, rest, tmp_path):
+        bpy.ops.meshfree.import_points(filepath=str(kept_in(core, rest, tmp_path)))
+        obj = bpy.context.object
+        linear = np.maximum(0.5 + 0.28209479 * rest.colors, 0.0) ** 2.2
+        mean = np.average(linear, axis=0, weights=rest.opacities)
+        material = next(item for item in bpy.data.materials if "Display" in item.name)
+        np.testing.assert_allclose(material.diffuse_color[:3], mean, rtol=1e-4)
+        np.testing.assert_allclose(obj.color[:3], mean, rtol=1e-4)
+        obj.color = (0.0, 0.0, 1.0, 1.0)
+        bpy.ops.meshfree.show_splats()
+        assert tuple(obj.color) == (0.0, 0.0, 1.0, 1.0)  # the user's
 
     def test_results_and_splats_are_shown_in_turn(self, core, rest, tmp_path):
         bpy.ops.meshfree.import_points(filepath=str(kept_in(core, rest, tmp_path)))
@@ -302,7 +324,7 @@ class TestDisplay:
         assert "lb_mean_curvature" in names
         assert bpy.ops.meshfree.show_splats() == {"FINISHED"}
         names = {node.attribute_name for node in material.node_tree.nodes if node.type == "ATTRIBUTE"}
-        assert names == {"radiance:base"}
+        assert names == {"lb_tint", "lb_opacity"}
         assert len(corners(obj)) == 12 * len(rest)
         obj.meshfree.point_shape = "DOTS"
         assert corners(obj) is None

@@ -47,6 +47,9 @@ def test_points_of_the_menu_is_all(gui, dropped):
     gui.wait_until(THERE, 60)
     gui.wait_for(lambda: red_share(gui) > 0.9, "it is red")
     gui.shot(f"dropped_{dropped}_seen")
+    for kind in ("MATERIAL", "VERTEX") if dropped == "splats" else ():
+        gui.python(f"{SHADING} = 'SOLID'; view3d()[0].spaces.active.shading.color_type = {kind!r}")
+        gui.wait_for(lambda: red_share(gui) > 0.9, "it is red in Solid")
 
 
 def test_what_blender_has_imported_is_shown_by_the_first_button(gui, dropped):
