@@ -22,7 +22,7 @@ from ..operators.objects.groups import handle_names, has_group
 from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import DISPLAY_TAG, get_input, has_input, set_input
 from ..operators.objects.reading import TYPES, sharing_objects, spacing
-from ..operators.objects.splats import BASE, has_splats
+from ..operators.objects.splats import BASE, MOST_DRAWN, has_splats
 from ..operators.running.discs import renew_discs
 from ..tools.groups import ANCHOR, BOUNDARY_GROUP, HANDLE, HIGH, LOW, ROLES
 from ..tools.quantities import MEAN_CURVATURE, STRAY, quantity
@@ -334,7 +334,9 @@ def _follow_points(obj):
 
 def show_splats(obj):
     """Show splats as ellipsoids in their own colors; in Solid in the mean of these."""
-    _add_display(obj)
+    modifier, new = _add_display(obj)
+    if new and point_count(obj.data) > MOST_DRAWN and not get_input(modifier, MOST):
+        set_input(modifier, MOST, MOST_DRAWN)
     colors = splat_colors(obj.data)
     mean = np.average(colors, axis=0, weights=read_attribute(obj.data, BASE)[:, 3] + 1e-6)
     color_splats(_display_material(obj), mean)

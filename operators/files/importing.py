@@ -25,6 +25,7 @@ from ..objects.handlers import notify
 from ..objects.notices import keep
 from ..objects.place import OFFSET, known_offset, offset_of
 from ..objects.reading import discs
+from ..objects.splats import MOST_DRAWN
 from ..registration import Registration
 from ..running import cache
 from ..running.ready import reporting
@@ -36,7 +37,6 @@ from .splats import add_splats, is_drawn, mark
 DROPPED = tuple(suffix for suffix in (*READABLE, *SPLATS) if suffix != ".obj")  # which are meshes nearly always
 
 _QUICK = 80_000  # points whose discs take less than two seconds
-_DRAWN = 200_000  # splats whose ellipsoids are drawn at once
 
 
 class MESHFREE_OT_import_points(ImportOperator, bpy.types.Operator):
@@ -136,8 +136,10 @@ class MESHFREE_OT_import_points(ImportOperator, bpy.types.Operator):
             deselect(obj.data)  # else the first assignment to a group would include all points
         for obj in clouds:
             mark(obj.data)
-            if self.surface and not self.sequence and point_count(obj.data) <= _DRAWN and not is_drawn(obj.data):
+            if self.surface and not self.sequence and not is_drawn(obj.data):
                 notify("splats_found", obj)
+                if point_count(obj.data) > MOST_DRAWN:
+                    self.note(f"{obj.name}: viewports draw {MOST_DRAWN:,} of its splats, renders all", obj)
         for obj in surfaces:  # after conversion, which would apply them
             notify("surface_found", obj)
         colored = [obj for obj in every if obj not in surfaces and own_colors(obj.data)]

@@ -27,6 +27,7 @@ LEFT_BEHIND = (
     "some of its splats were rotated or scaled without their ellipsoids, as Blender's own Join and Apply do. Undo that,"
     " and use Join Splats or Apply Transform to Splats instead"
 )
+MOST_DRAWN = 200_000  # splats that a viewport draws, unless the user asks for more
 _MOST_STEPS = 32  # different translations of splats: more of them mean rotation or scaling
 _STEP = 1e-5  # of the largest coordinate: smaller steps count as equal
 _GLANCE = 4000  # splats that a panel checks

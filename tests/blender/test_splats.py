@@ -329,6 +329,15 @@ class TestDisplay:
         obj.meshfree.point_shape = "DOTS"
         assert corners(obj) is None
 
+    def test_of_very_many_viewports_draw_some(self, core, rest, tmp_path, monkeypatch, modifiers):
+        for module in ("operators.files.importing", "ui.show"):
+            monkeypatch.setattr(part(module), "MOST_DRAWN", 500)
+        bpy.ops.meshfree.import_points(filepath=str(kept_in(core, rest, tmp_path)))
+        obj = bpy.context.object
+        assert modifiers.get_input(obj.modifiers[0], "Viewport Points") == 500
+        assert 400 < len(corners(obj)) / 12 < 600 < len(rest)
+        assert "viewports draw 500 of its splats, renders all" in obj.meshfree.notices[-1].text
+
     def test_without_the_switch_splats_are_plain_points(self, core, rest, tmp_path):
         bpy.ops.meshfree.import_points(filepath=str(kept_in(core, rest, tmp_path)), surface=False)
         assert not bpy.context.object.modifiers
