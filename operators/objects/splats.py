@@ -54,8 +54,8 @@ def column_names(data) -> list:
 
 
 def holds_columns(data) -> bool:
-    """Whether attributes of points are the columns of a file of splats, as Blender's importer of PLY leaves them."""
-    if _FIRST not in data.attributes or has_splats(data):
+    """Whether attributes of loose points are the columns of a file of splats, as Blender's importer of PLY leaves them."""
+    if _FIRST not in data.attributes or has_splats(data) or getattr(data, "polygons", ()):
         return False
     return core.splats.hold_enough((*"xyz", *column_names(data)))
 
