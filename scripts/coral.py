@@ -5,6 +5,14 @@ import math
 import numpy as np
 
 GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
+_PAINT = (
+    (52, 20, 44),
+    (133, 36, 60),
+    (206, 74, 52),
+    (240, 140, 62),
+    (250, 205, 130),
+    (255, 245, 226),
+)  # from low to high
 
 
 def spread_directions(count):
@@ -35,6 +43,26 @@ class Coral:
         """Area of the surface, by a sum over directions that are spread evenly."""
         return 4.0 * math.pi * self.radii(spread_directions(count))[1].mean()
 
+    def scan(self, count):
+        """Draw points as a scan of a coral that has grown to this shape would: with polyps, (count, 3), and in colors.
+
+        Returns
+        -------
+        points : ndarray, (count, 3)
+        colors : ndarray, (count, 3) uint8
+        """
+        smooth = self.sample(count)
+        return smooth * (1.0 + 0.03 * _polyps(smooth))[:, None], self.paint(smooth)
+
+    def paint(self, points):
+        """Return colors of points of the surface, of sRGB, (n, 3) uint8: dark between the arms, pale at the tips."""
+        height = np.interp(np.linalg.norm(points, axis=1), (0.75, 2.05), (0.0, 1.0))
+        height = np.clip(height + 0.1 * _polyps(points), 0.0, 1.0)
+        steps = np.linspace(0.0, 1.0, len(_PAINT))
+        return np.rint(
+            np.stack([np.interp(height, steps, channel) for channel in np.transpose(_PAINT)], axis=1)
+        ).astype(np.uint8)
+
     def sample(self, count, seed=2):
         """Draw points at random, evenly over the area."""
         random = np.random.default_rng(seed)
@@ -43,3 +71,12 @@ class Coral:
         radii, densities = self.radii(directions)
         kept = np.flatnonzero(random.random(len(radii)) * densities.max() < densities)[:count]
         return radii[kept, None] * directions[kept]
+
+
+def _polyps(points):
+    """Return a pattern of knobs as high as 1, and pits as deep, at points, (n, 3) to (n,): a gyroid and a finer one."""
+    result = np.zeros(len(points))
+    for size, share in ((13.0, 0.65), (23.0, 0.35)):
+        x, y, z = size * points.T + 0.3 * size
+        result += share * (np.sin(x) * np.cos(y) + np.sin(y) * np.cos(z) + np.sin(z) * np.cos(x)) / 1.5
+    return result

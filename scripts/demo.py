@@ -15,6 +15,8 @@ OUTPUT = Path("build", "demo")  # in the present folder, which in_blender.py let
 MODES = 30
 SHOWN = 20
 POINTS = 20_000
+PICTURE = {"size": (1600, 620), "samples": 32}
+LINES = 15  # of equal values of the mode
 
 
 def load_scan(path, up):
@@ -44,7 +46,7 @@ def demonstrate(scan, up):
     """Analyze the points, print the results, and write a .blend file and a picture."""
     shape = Coral()
     with studio.silence():
-        obj = studio.make_object(shape.sample(POINTS), "Coral") if scan is None else load_scan(scan, up)
+        obj = painted(shape) if scan is None else load_scan(scan, up)
     print(f"points       {len(obj.data.vertices):,}", flush=True)
     timed("analyze", bpy.ops.meshfree.analyze)
     timed("spectrum", bpy.ops.meshfree.spectrum, count=MODES, show=False)
@@ -56,26 +58,42 @@ def demonstrate(scan, up):
     print(f"eigenvalues  {', '.join(f'{value:.4g}' for value in values[:8])}, ...")
 
     began = perf_counter()
-    blend, picture, photograph = (OUTPUT.absolute() / name for name in ("demo.blend", "demo.png", "scan.png"))
-    photograph.unlink(missing_ok=True)
+    blend, picture = (OUTPUT.absolute() / name for name in ("demo.blend", "demo.png"))
     with studio.silence():
-        studio.set_up(bpy.context.scene, obj)
-        studio.picture(bpy.context.scene, obj, f"lb_eigenvector_{SHOWN:03}", picture)
-        picture_of_colors(bpy.context.scene, obj, photograph)
+        take(obj, picture)
         bpy.ops.wm.save_as_mainfile(filepath=str(blend), compress=True)
-    colors = ", and its own colors" if photograph.exists() else ""
-    print(f"picture      {perf_counter() - began:.2f} s, mode {SHOWN}{colors}")
-    for path in filter(Path.exists, (blend, picture, photograph)):
+    print(f"picture      {perf_counter() - began:.2f} s, as it is, mean curvature, and mode {SHOWN}")
+    for path in (blend, picture):
         print(f"written      {path.relative_to(Path.cwd())}")
 
 
-def picture_of_colors(scene, obj, path):
-    """Show a scan in colors of its own, if it has any, and render it."""
+def painted(shape):
+    """Add an object of points of a shape, in its colors."""
+    points = shape.sample(POINTS)
+    obj = studio.make_object(points, "Coral")
+    studio.color(obj, shape.paint(points))
+    return obj
+
+
+def take(obj, path):
+    """Render an object in its own colors, or as if made of clay, beside its mean curvature and a mode."""
+    objects = [obj]
+    for name in ("Curvature", "Mode"):
+        objects.append(obj.copy())
+        objects[-1].name, objects[-1].data = name, obj.data.copy()
+        bpy.context.scene.collection.objects.link(objects[-1])
+    _, curved, waving = objects
     colors = studio.part("operators.objects.colors").own_colors(obj.data)
     if colors:
         studio.show(obj, colors)
-        studio.aim(scene, studio.world_points(obj), studio.VIEW, room=0.0)  # there is no legend
-        studio.render(scene, path)
+    else:
+        studio.show_shape(obj, normals="lb_normal")
+    studio.show(curved, "lb_mean_curvature")
+    waving.meshfree.iso_lines = LINES
+    studio.show(waving, f"lb_eigenvector_{SHOWN:03}")
+    studio.line_up(objects, gap=0.1)
+    studio.set_up(bpy.context.scene, objects, **PICTURE, legend=False)
+    studio.render(bpy.context.scene, path)
 
 
 def main():

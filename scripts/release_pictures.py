@@ -1,4 +1,4 @@
-"""The icon and the featured picture of the extension's page on Blender's platform, rendered by pictures.py."""
+"""The first picture of the README; icon and featured picture of the page on Blender's platform: by pictures.py."""
 
 import math
 
@@ -6,17 +6,17 @@ import bpy
 from mathutils import Matrix
 
 import animation
-import demo
 import studio
-from coral import spread_directions
+from coral import Coral, spread_directions
 
-ICON, FEATURED = (256, 256), (1920, 1080)  # pixels
+ICON, FIRST, FEATURED = (256, 256), (1200, 460), (1920, 1080)  # pixels
 VIEW = (0.5, -1.0, 0.6)  # direction towards the camera of the icon
 BEADS, BEAD = 600, 0.8  # points of the icon, few enough to be seen as such, and their radius in units of their spacing
 AMPLITUDE = 0.45  # of its radius
-SHOWN, DOT = 2500, 0.42  # the same for the points of the other picture
-MODE = 20
-LINES, GAP = 15, 0.12
+POINTS, GAP = 40_000, 0.1
+SHAPE = {"arms": 15, "height": 1.4, "sharpness": 15.0}
+TIP, BENT, STAYS = (1.0, 0.3, 0.2), 0.45, -0.2  # the arm that is bent, by what within this of its tip, and what stays
+LIT = 0.7  # so that the form of the surface shows beside its colors
 COLORS = 255
 INK = (0.03, 0.035, 0.045, 1.0)
 TITLE = "Mesh-Free Laplacian"
@@ -42,31 +42,46 @@ def icon(path):
     studio.render(scene, path)
 
 
-def featured(path):
-    """From points to the curvature of their surface and to a mode of it, under the name of the extension."""
-    points = demo.Coral().sample(demo.POINTS)
-    kept = studio.part("core").clean.thin_out(points, count=SHOWN)
-    raw, curved, waving = (
-        studio.make_object(part, name)
-        for part, name in ((points[kept], "Points"), (points, "Curvature"), (points, "Mode"))
-    )
-    dots = studio.add_display(raw, DOT * studio.part("operators.objects.reading").spacing(raw.data))
-    studio.part("operators.objects.modifiers").set_input(dots, "Material", studio.paint("Points", studio.CLAY))
+def show_wow(size):
+    """Set up a scene with a coral, of our own making as if scanned, in its colors, by its curvature, and bent."""
+    points, colors = Coral(**SHAPE).scan(POINTS)
+    colored, curved, bent = objects = [studio.make_object(points, name) for name in ("Colors", "Curvature", "Bend")]
+    for obj in objects:
+        studio.color(obj, colors)
+    studio.show(colored, "Color")
     studio.activate(curved)
     bpy.ops.meshfree.analyze()
     studio.show(curved, "lb_mean_curvature")
-    studio.activate(waving)
-    bpy.ops.meshfree.spectrum(count=MODE)
-    waving.meshfree.iso_lines = LINES
-    studio.show(waving, f"lb_eigenvector_{MODE:03}")
-    objects = [raw, curved, waving]
+    studio.group(bent, studio.tip(bent, TIP), "HANDLE", grown=BENT)
+    studio.group(bent, points[:, 2] < STAYS, "ANCHOR")
+    studio.deform(bent, move=(-0.5, -0.2, 1.2), rotate=(0.0, -1.2, 0.0))
+    bpy.ops.meshfree.deform_apply()
+    bpy.ops.meshfree.deform_unbind()
+    studio.show(bent, "Color")
+    for obj in objects:
+        obj.meshfree.shaded = LIT
     studio.line_up(objects, gap=GAP)
-    scene = bpy.context.scene
-    studio.set_up(scene, objects, FEATURED, studio.SAMPLES, legend=False)
-    write(scene, TITLE, 0.11, 0.36)
-    write(scene, TAGLINE, 0.042, -0.42)
-    studio.render(scene, path)
+    studio.set_up(bpy.context.scene, objects, size, studio.SAMPLES, legend=False)
+
+
+def render(path):
+    """Render the scene in few colors."""
+    studio.render(bpy.context.scene, path)
     animation.write_still(path, studio.pixels(path), COLORS)
+
+
+def first(path):
+    """What the README begins with."""
+    show_wow(FIRST)
+    render(path)
+
+
+def featured(path):
+    """The same under the name of the extension."""
+    show_wow(FEATURED)
+    write(bpy.context.scene, TITLE, 0.11, 0.36)
+    write(bpy.context.scene, TAGLINE, 0.042, -0.42)
+    render(path)
 
 
 def write(scene, text, size, place):
@@ -83,4 +98,4 @@ def write(scene, text, size, place):
     scene.collection.objects.link(line)
 
 
-PICTURES = {"icon": icon, "featured": featured}
+PICTURES = {"icon": icon, "first": first, "featured": featured}

@@ -135,6 +135,12 @@ def make_object(points, name):
     return obj
 
 
+def color(obj, colors):
+    """Give the points of an object colors of sRGB, (n, 3) uint8."""
+    layer = obj.data.color_attributes.new("Color", "BYTE_COLOR", "POINT")
+    layer.data.foreach_set("color_srgb", np.insert(colors / 255.0, 3, 1.0, axis=1).astype(np.float32).reshape(-1))
+
+
 def world_points(obj):
     """Points of an object in the world, (n, 3)."""
     positions = obj.data.attributes["position"].data

@@ -1,6 +1,5 @@
 """The README's first command with a scan of the user's own, as `make demo SCAN=file.ply` runs it, in small pictures."""
 
-import functools
 import os
 import subprocess
 import sys
@@ -13,13 +12,13 @@ import pytest
 import package
 
 from .clouds import sphere_points
+from .conftest import part
 
 FOLDER = Path("build", "demo")
-SMALL = {"size": (320, 200), "samples": 4}
+SMALL = {"size": (480, 200), "samples": 4}
 RUN = f"""
-import functools, studio
-studio.set_up = functools.partial(studio.set_up, **{SMALL})
 import demo
+demo.PICTURE = {SMALL}
 demo.main()
 """
 
@@ -42,14 +41,15 @@ def test_the_demonstration_shows_a_scan_in_its_colors(tmp_path):
         text=True,
         timeout=240,
     )
-    for line in ("points       600", "written      build/demo/demo.png", "written      build/demo/scan.png"):
+    for line in ("points       600", "written      build/demo/demo.png"):
         assert line in done.stdout, done.stdout + done.stderr
     written = tmp_path / FOLDER
-    picture = bpy.data.images.load(str(written / "scan.png"))
-    pixels = np.array(picture.pixels).reshape(picture.size[1], picture.size[0], -1)
-    red, green, blue = pixels[75:125, 135:185, :3].mean(axis=(0, 1))
-    assert red > 0.5
-    assert max(green, blue) < 0.2
+    picture = bpy.data.images.load(str(written / "demo.png"))
+    pixels = np.array(picture.pixels).reshape(picture.size[1], picture.size[0], -1)[75:125]
+    colored, curved, waving = (pixels[:, place : place + 30, :3].mean(axis=(0, 1)) for place in (65, 225, 385))
+    assert colored[0] > 0.5
+    assert colored[1:].max() < 0.2
+    assert min(np.abs(curved - colored).max(), np.abs(waving - curved).max()) > 0.2
     bpy.ops.wm.open_mainfile(filepath=str(written / "demo.blend"))
     assert "Color" in [
         node.attribute_name
@@ -59,18 +59,14 @@ def test_the_demonstration_shows_a_scan_in_its_colors(tmp_path):
     ]
 
 
-def test_of_a_scan_without_colors_there_is_one_picture(capfd, tmp_path, monkeypatch):
+def test_a_scan_without_colors_is_made_of_clay(capfd, tmp_path, monkeypatch):
     import demo
-    import studio
 
-    monkeypatch.setattr(studio, "set_up", functools.partial(studio.set_up, **SMALL))
+    monkeypatch.setattr(demo, "PICTURE", SMALL)
     monkeypatch.chdir(tmp_path)
-    photograph = tmp_path / FOLDER / "scan.png"
-    photograph.parent.mkdir(parents=True)
-    photograph.touch()  # of a run before
+    (tmp_path / FOLDER).mkdir(parents=True)
     np.savetxt(tmp_path / "scan.xyz", sphere_points(600))
     demo.demonstrate(tmp_path / "scan.xyz", "Z")
-    told = capfd.readouterr().out
-    assert "written      build/demo/demo.png" in told
-    assert "scan.png" not in told
-    assert not photograph.exists()
+    assert "written      build/demo/demo.png" in capfd.readouterr().out
+    (modifier,) = bpy.data.objects["scan"].modifiers
+    assert part("operators.objects.modifiers").get_input(modifier, "Material").name == "Clay"
