@@ -188,9 +188,10 @@ def in_modes(laplacian: Laplacian, chosen: Chosen, count: int, progress: Progres
             whole += float(np.sum(areas * pulse**2))
         ranges.append((now.min(), now.max()))
     low, high = np.min(ranges, axis=0)[0], np.max(ranges, axis=0)[1]
-    last = high
-    if chosen.kind == "WAVE":
-        last = _FADED * high if chosen.touched is None else np.abs(ranges[len(ranges) // 2 :]).max()
+    if chosen.touched is not None:
+        last = np.abs(ranges[len(ranges) // 2 :]).max()
+    else:
+        last = _FADED * high if chosen.kind == "WAVE" else formula.at(0.5).max()
     return InModes(formula, low, high, last, held / whole, distance)
 
 

@@ -145,9 +145,9 @@ class Watched:
 
     @property
     def last(self) -> float:
-        """The largest size on show in the end."""
-        late = float(np.abs(self._ranges[len(self._ranges) // 2 :]).max())
-        return {"WAVE": late, "REACTION": self._ranges[-1][1]}.get(self._chosen.kind, self.high)
+        """The largest size on show in the end: of the second half, as heat and waves fade; patterns grow."""
+        late = self._ranges[-1:] if self._chosen.kind == "REACTION" else self._ranges[len(self._ranges) // 2 :]
+        return float(np.abs(late).max())
 
 
 def reached(laplacian: Laplacian, sources: Array) -> Array:

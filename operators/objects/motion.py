@@ -14,6 +14,7 @@ from .handlers import add_handlers, notify, remove_handlers
 from .notices import keep
 
 TOOL = "Simulate Along Surface"  # whose notices these are
+TEMPORARY = "The frames are in a temporary folder until the file is saved, which takes them along."
 _DTYPE = np.dtype("<f4")
 _open = {}  # frames by path and time of change: memory maps of files
 

@@ -1,5 +1,7 @@
-"""Files of frames: where they are, and how long former ones stay for Undo."""
+"""Files of frames: where they are, how they go along when the file is saved, and how long former ones stay for Undo."""
 
+import os
+import shutil
 import uuid
 from pathlib import Path
 
@@ -7,10 +9,13 @@ import bpy
 from bpy.app.handlers import persistent
 
 from .handlers import add_handlers, remove_handlers
-from .motion import close_frames
+from .motion import TEMPORARY, TOOL, close_frames
+from .notices import keep, remove
 
+FOLDER = "//motion"  # beside the file
 _known = {}  # files that were made or replaced since Blender started, in their order, as keys
 _saved = {}  # by .blend file: the frames that it plays, as saved or loaded
+_before = []  # objects whose frames go along with the file that is being saved, and what they named before
 
 
 def home(folder: str) -> Path:
@@ -89,7 +94,11 @@ def shrink_former(most: float) -> int:
 
 def _played():
     """Return the files that objects play, as a set."""
-    return {frames_of(obj) for obj in bpy.data.objects} - {None}
+    return {_absolute(name) for name in _named()}
+
+
+def _named():
+    return {obj.meshfree.motion_file for obj in bpy.data.objects} - {""}
 
 
 def _all_saved():
@@ -109,8 +118,60 @@ def _remove_all():
 
 
 @persistent
+def _before_save(path, *_):
+    """Let objects name their frames as seen from the file that is to be saved; temporary ones are copied beside it."""
+    _before.clear()
+    if not path:  # the startup file
+        return
+    folder = Path(path).resolve().parent
+    for obj in [obj for obj in bpy.data.objects if obj.meshfree.motion_file and obj.is_editable]:
+        named, file = obj.meshfree.motion_file, frames_of(obj)
+        try:
+            if file.is_relative_to(Path(bpy.app.tempdir).resolve()) and file.exists():
+                file = _copied(file, folder / FOLDER.removeprefix("//"))
+            elif not named.startswith("//"):
+                continue
+            obj.meshfree.motion_file = f"//{os.path.relpath(file, folder)}".replace(os.sep, "/")
+        except (OSError, ValueError) as error:  # no room, no right to write, another drive
+            keep(obj, TOOL, f"The frames did not go along with the file: {error}. Save it in another folder.")
+            continue
+        _before.append((obj, named))
+
+
+def _copied(file, folder):
+    """Copy frames to a folder, unless they are there, and return their new path."""
+    target = folder / file.name
+    if not target.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        part = target.with_suffix(".part")
+        shutil.copyfile(file, part)
+        part.replace(target)
+    _known[target] = None
+    return target
+
+
+def _take_back():
+    """Let objects name their frames as before."""
+    for obj, named in _before:
+        obj.meshfree.motion_file = named
+    _before.clear()
+
+
+@persistent
 def _on_save(path, *_):
-    _saved[path or bpy.data.filepath] = _played()
+    path = path or bpy.data.filepath
+    folder = Path(path).parent
+    _saved[path] = {Path(bpy.path.abspath(name, start=str(folder))).resolve() for name in _named()}
+    if Path(path).resolve() != Path(bpy.data.filepath).resolve():  # it is a copy, and this file goes on
+        _take_back()
+    for obj, _ in _before:
+        remove(obj, TEMPORARY)
+    _before.clear()
+
+
+@persistent
+def _on_failure(*_):
+    _take_back()
 
 
 @persistent
@@ -119,7 +180,12 @@ def _on_load(*_):
     _remove_all()
 
 
-_HANDLERS = {"save_post": _on_save, "load_post": _on_load}
+_HANDLERS = {
+    "save_pre": _before_save,
+    "save_post": _on_save,
+    "save_post_fail": _on_failure,
+    "load_post": _on_load,
+}
 
 
 def attach():
@@ -131,5 +197,5 @@ def detach():
     """Remove the handlers, and what nothing can play any more: Blender quits."""
     remove_handlers(_HANDLERS)
     _remove_all()
-    _known.clear()
-    _saved.clear()
+    for kept in (_known, _saved, _before):
+        kept.clear()

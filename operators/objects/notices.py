@@ -36,6 +36,11 @@ def forget(obj, tool: str):
     _remove(obj.meshfree.notices, lambda kept: kept.tool == tool)
 
 
+def remove(obj, text: str):
+    """Remove the notices of one text from an object: what it asks for is done."""
+    _remove(obj.meshfree.notices, lambda kept: kept.text == in_blender(text))
+
+
 def renew(obj, tool: str, texts):
     """Replace the notices of an earlier run of a tool."""
     forget(obj, tool)

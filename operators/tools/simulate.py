@@ -13,7 +13,7 @@ from ...tools import simulate
 from ...tools.motions import InModes, find_touched, in_modes
 from ...tools.quantities import MOTION, NORMAL
 from ..objects import motion_files
-from ..objects.motion import show_frame, show_values, write_frames
+from ..objects.motion import TEMPORARY, show_frame, show_values, write_frames
 from ..objects.motion_nodes import forget_groups, mode_name, show_motion
 from ..objects.result import length_text
 from ..objects.touching import places_of
@@ -21,7 +21,6 @@ from ..running.application import operator_reader
 from .declared import registration_of
 from .select import read_sources
 
-FOLDER = "//motion"  # beside the file
 _IN_MODES = ("HEAT", "WAVE")
 _BLURRED = 0.99  # share of a pulse that the modes should hold
 _MEGABYTE = 1 << 20
@@ -109,7 +108,7 @@ class Kept:
     folder: StringProperty(
         name="Folder",
         description="Where frames are kept, beside the file that is saved; empty for a temporary folder",
-        default=FOLDER,
+        default=motion_files.FOLDER,
         subtype="DIR_PATH",
     )
 
@@ -191,10 +190,7 @@ class Kept:
                 " those between are interpolated."
             )
         if motion.path.is_relative_to(Path(bpy.app.tempdir).resolve()):
-            notices.append(
-                "The frames are in a temporary folder, which Blender empties when it quits. Save the file, and simulate"
-                " again to keep them."
-            )
+            notices.append(TEMPORARY)
         return notices
 
     def _line(self, obj, result):
@@ -203,7 +199,7 @@ class Kept:
             size = f"{len(motion.formula.rates)} modes"
         else:
             size = f"{motion.path.stat().st_size / _MEGABYTE:.1f} MB"
-        return f"{obj.name}: {simulate.motion_line(self, motion, length_text)}, {size}"
+        return f"{obj.name}: {simulate.motion_line(self, motion, length_text)}, {size}. Press Space to play it"
 
     def conclude(self, context, objects):
         super().conclude(context, objects)
@@ -231,7 +227,7 @@ def _on_disk(path, laplacian, chosen, progress) -> _Frames:
 
 
 def _lock_range(settings, kind, motion):
-    """Show all frames in one range of colors: that of the last ones, which waves and reactions grow or fade to."""
+    """Show all frames in one range of colors: that of the last ones, which all but a front grow or fade to."""
     settings.range_mode = "LOCKED"
     settings.range_low, settings.range_high = (-motion.last, motion.last) if kind == "WAVE" else (0.0, motion.last)
     if kind == "WAVE" and settings.color_map == "AUTO":

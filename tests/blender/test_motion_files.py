@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from tests.blender.clouds import attribute
+from tests.blender.clouds import add_group, add_object, attribute, sphere_points
 from tests.blender.conftest import part
 from tests.blender.test_simulate import cloud, frames  # noqa: F401
 
@@ -111,3 +111,58 @@ def test_a_failed_motion_leaves_no_file(cloud, tmp_path, monkeypatch):  # noqa: 
     with pytest.raises(RuntimeError, match="memory is used up"):
         simulate(0.5)
     assert not (tmp_path / "motion").exists()
+
+
+@pytest.fixture
+def unsaved(tmp_path):
+    """A sphere with frames in a file that was never saved."""
+    bpy.ops.wm.read_homefile(use_empty=True)
+    obj = add_object(sphere_points(400))
+    add_group(obj, "Source", [0])
+    bpy.context.scene.frame_end = 5
+    bpy.ops.meshfree.simulate(kind="FRONT", show=False)
+    return obj
+
+
+def values_at(frame):
+    bpy.context.scene.frame_set(frame)
+    return attribute(bpy.data.objects["Cloud"], "lb_motion")
+
+
+@pytest.mark.any_blender
+def test_saving_takes_frames_along_that_were_made_before(unsaved, tmp_path):
+    expected = values_at(4)
+    for name in ("first", "other"):
+        (tmp_path / name).mkdir()
+    save(tmp_path / "first" / "a.blend")
+    (file,) = there(tmp_path / "first" / "motion")
+    assert unsaved.meshfree.motion_file == f"//motion/{file.name}"
+    assert not any("temporary" in notice.text for notice in unsaved.meshfree.notices)
+    assert_allclose(values_at(4), expected)
+    save(tmp_path / "other" / "b.blend")  # elsewhere, it plays the same file
+    assert unsaved.meshfree.motion_file == f"//../first/motion/{file.name}"
+    for path in (tmp_path / "first" / "a.blend", tmp_path / "other" / "b.blend"):
+        bpy.ops.wm.read_homefile(use_empty=True)
+        bpy.ops.wm.open_mainfile(filepath=str(path))
+        assert_allclose(values_at(4), expected)
+    assert there(tmp_path / "first" / "motion") == {file}
+
+
+@pytest.mark.any_blender
+def test_a_copy_takes_frames_along_and_this_file_keeps_its_own(unsaved, tmp_path):
+    named, expected = unsaved.meshfree.motion_file, values_at(4)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "copy.blend"), copy=True)
+    assert unsaved.meshfree.motion_file == named
+    assert any("temporary" in notice.text for notice in unsaved.meshfree.notices)
+    assert_allclose(values_at(4), expected)
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "copy.blend"))
+    assert bpy.data.objects["Cloud"].meshfree.motion_file.startswith("//motion/")
+    assert_allclose(values_at(4), expected)
+
+
+def test_frames_that_cannot_go_along_are_told(unsaved, tmp_path):
+    named = unsaved.meshfree.motion_file
+    (tmp_path / "motion").write_text("a file of that name")
+    save(tmp_path / "a.blend")
+    assert unsaved.meshfree.motion_file == named
+    assert any("did not go along" in notice.text for notice in unsaved.meshfree.notices)

@@ -43,6 +43,24 @@ def test_frames_of_heat_are_those_of_core(cloud, core):
     assert frames(cloud).shape == (FRAMES, 600)
 
 
+@pytest.mark.parametrize("keep", ["FRAMES", "MODES"])
+def test_heat_is_seen_to_the_last_frame(cloud, keep, capfd):
+    """It fades to a few percent of the pulse, which would be black in the range of all frames."""
+    bpy.ops.meshfree.simulate(kind="HEAT", keep=keep, width=0.2)
+    shown, high = [], cloud.meshfree.range_high
+    for frame in (3 + FRAMES // 3, 2 + FRAMES):
+        bpy.context.scene.frame_set(frame)
+        mesh = cloud.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+        values = np.empty(len(mesh.attributes["lb_motion"].data), np.float32)
+        mesh.attributes["lb_motion"].data.foreach_get("value", values)
+        shown.append(values.max() / high)
+    assert cloud.meshfree.range_mode == "LOCKED"
+    assert high < 0.5
+    assert shown[0] > 0.9
+    assert shown[1] > 0.3
+    assert "Press Space to play it" in capfd.readouterr().out
+
+
 def test_the_frame_of_the_scene_is_played(cloud):
     bpy.ops.meshfree.simulate(kind="FRONT")
     kept = frames(cloud)
@@ -130,7 +148,7 @@ def test_a_file_of_other_points_is_told(cloud):
     assert any("600 points, and there are 601" in notice.text for notice in cloud.meshfree.notices)
 
 
-def test_an_unsaved_file_keeps_frames_for_this_time_only():
+def test_frames_of_an_unsaved_file_are_temporary_until_it_is_saved():
     obj = add_object(sphere_points(400))
     add_group(obj, "Source", [0])
     bpy.context.scene.frame_end = 5
