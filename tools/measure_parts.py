@@ -90,7 +90,7 @@ class MeasureParts(Tool):
         components = [row for row in rows if row.name.startswith("Component")]
         area, off = (sum(getattr(row, name) for row in components) for name in ("area", "area_uncertainty"))
         parts = f"{len(rows):,} part{'s' if len(rows) > 1 else ''}"
-        line = f"{parts} measured, area {length(area, 2)} +- {100.0 * off / area:.2g} %"
+        line = f"{parts} measured, area {length(area, 2)} ± {100.0 * off / area:.2g} %"
         beside = found.beside or [{}] * len(rows)
         figures = {"parts": [row.record() | more for row, more in zip(rows, beside, strict=True)]}
         return Outcome({}, line, found.notices, figures=figures, made=rows)

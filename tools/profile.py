@@ -98,7 +98,7 @@ class Profile(Tool):
     def finish(self, found: Any, laplacian: Laplacian, own: Any, length: Length) -> Outcome:
         what = own.source or f"height along {own.axis}"
         low, high, off = np.nanmin(found.values), np.nanmax(found.values), np.sqrt(np.nanmean(found.off**2))
-        line = f"{length(found.distance[-1])} long, {what} from {low:.4g} to {high:.4g}, +- {off:.2g}"
+        line = f"{length(found.distance[-1])} long, {what} from {low:.4g} to {high:.4g}, ± {off:.2g}"
         missing, count = np.count_nonzero(~np.isfinite(found.values)), len(found.values)
         notices = [f"{missing:,} of {count:,} places of the path have no value."] if missing else []
         figures = {

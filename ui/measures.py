@@ -81,7 +81,7 @@ def as_text(obj, settings) -> str:
     found = columns(obj, settings)
     titles = ["Part", "Points"]
     for title, cells in found:
-        titles += [title, "+-"] if any(off for _, off in cells) else [title]
+        titles += [title, "±"] if any(off for _, off in cells) else [title]
     lines = ["\t".join(titles)]
     for number, row in enumerate(kept_rows(obj)):
         texts = [row.name, str(row.points)]

@@ -10,7 +10,8 @@ class KeptTable:
 
     def write(self, context, obj, result):
         keep_rows(obj, result[0].rows, result[0].attribute)
-        return super().write(context, obj, result)
+        *notices, line = super().write(context, obj, result)
+        return [*notices, f"{line}. The table is in the sidebar (N), Mesh-Free, Measure"]
 
 
 TOOLS = (registration_of(measure_parts.TOOL, KeptTable),)

@@ -99,7 +99,7 @@ class MESHFREE_OT_measure_selection(SelectionOperator, bpy.types.Operator):
                 self.note(f"{obj.name}: {line}", obj)
             for notice in [*left, *notices]:
                 self.warn(notice, obj)
-            return f"{np.count_nonzero(chosen):,} points are measured"
+            return f"{np.count_nonzero(chosen):,} points, {lines[0]}. All figures are in the sidebar (N), Mesh-Free"
 
         return keep
 
@@ -190,7 +190,7 @@ def _pile_text(found, settings):
 
 def _within(text, value, off):
     """Return a number in the scene's units with its uncertainty, as a share of it."""
-    return f"{text(value)} +- {100.0 * off / abs(value):.2g} %" if value else f"{text(value)} +- {text(off)}"
+    return f"{text(value)} ± {100.0 * off / abs(value):.2g} %" if value else f"{text(value)} ± {text(off)}"
 
 
 class MESHFREE_OT_geodesic_path(SelectionOperator, bpy.types.Operator):

@@ -139,7 +139,7 @@ def test_the_table_in_the_clipboard(obj):
     settings.system, settings.scale_length, settings.length_unit = "METRIC", 0.001, "MILLIMETERS"
     bpy.ops.meshfree.measure_parts()
     titles, *lines = part("ui.measures").as_text(obj, settings).splitlines()
-    assert titles.split("\t") == ["Part", "Points", "Area (mm²)", "+-", "Volume (mm³)", "+-"]
+    assert titles.split("\t") == ["Part", "Points", "Area (mm²)", "±", "Volume (mm³)", "±"]
     name, points, area, off, volume, doubt = lines[0].split("\t")
     assert (name, points) == ("Component 0", "900")
     assert within(float(area), float(off), 16.0 * np.pi)

@@ -44,6 +44,16 @@ def test_half_a_sphere(obj, mode):
     assert figure(obj, "Over the plane of its rim") == pytest.approx(2.0 * np.pi / 3.0, rel=0.04)
 
 
+def test_the_status_bar_tells_the_area_and_where_the_other_figures_are(obj, capfd):
+    choose(obj, local_points(obj)[:, 2] > 0.0)
+    bpy.ops.meshfree.measure_selection()
+    assert re.search(r"Cloud: 4\d\d points, Area 6.\d+ m² ± .* %. All .* sidebar \(N\)", capfd.readouterr().out)
+    bpy.ops.meshfree.measure_parts()
+    assert re.search(
+        r"1 part measured, area 12.\d+ m² ± .* %. The table is in the sidebar \(N\)", capfd.readouterr().out
+    )
+
+
 def test_the_figures_follow_the_scale_and_the_last_selection(obj):
     choose(obj, local_points(obj)[:, 2] > 0.5)
     bpy.ops.meshfree.measure_selection()
