@@ -35,6 +35,11 @@ def is_in_solid(obj) -> bool:
     return known and get_input(modifier, SOLID_NAME) != ""
 
 
+def is_cloud(obj) -> bool:
+    """Whether an object is a mesh without faces, whose points Edit Mode would show as black dots."""
+    return obj.type == "MESH" and not len(obj.data.polygons)
+
+
 def draws_faces(obj) -> bool:
     """Whether viewports draw faces of an object, of a mesh or of discs, rather than dots."""
     modifier = find_display(obj)

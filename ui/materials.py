@@ -23,10 +23,10 @@ _KIND = "meshfree_kind"  # custom property of the material: which nodes it has
 _LINE, _DARK = 0.2, (0.02, 0.02, 0.02, 1.0)  # share of a step that a line takes, and its color
 _BROADEST = 0.3  # of that, half of it, where steps are narrow
 BEYOND = (0.12, 0.12, 0.12, 1.0)  # color of what lies beyond the range
-_DIM = 0.85  # how dark the back side becomes where it is dimmed
+DIM = 0.85  # how dark the back side becomes where it is dimmed
 _PLAIN, _GRAY = "PLAIN", (0.25, 0.25, 0.25, 1.0)  # where nothing is on show but groups
 _COLORED = "COLOR"  # where points have colors of their own
-_CHECKERED, _CHECKS = "CHECKER", 20  # along the texture
+_CHECKERED, CHECKS = "CHECKER", 20  # along the texture
 CHECKER = {"Even": (0.9, 0.82, 0.6, 1.0), "Odd": (0.02, 0.12, 0.25, 1.0)}  # colors of the checks
 _SPLATTED, _CONSTANT = "SPLATS BY TINT", 0.28209479  # the harmonic of degree 0
 _GAMMA = 2.2  # makes the steps of direction colours even to the eye
@@ -94,7 +94,7 @@ def shade(material, lit):
 
 def dim_back(material, dimmed):
     """Let a material show what is seen from behind darker, such as the inside of an open scan, or alike."""
-    material.node_tree.nodes[BACK].inputs[1].default_value = _DIM if dimmed else 0.0
+    material.node_tree.nodes[BACK].inputs[1].default_value = DIM if dimmed else 0.0
 
 
 def is_plain(material) -> bool:
@@ -113,8 +113,8 @@ def color_by_checker(material, name, groups):
     if tree := _begin(material, name, f"{_CHECKERED} {groups}"):
         place = tree.vector("ADD", tree.nodes[ATTRIBUTE].outputs["Vector"], _rise(tree))
         # Across the planes between checks rounding would decide.
-        level = tree.vector("ADD", place, (0.0, 0.0, 0.5 / _CHECKS))
-        _shine(tree, tree.node("ShaderNodeTexChecker", level, *CHECKER.values(), _CHECKS), groups)
+        level = tree.vector("ADD", place, (0.0, 0.0, 0.5 / CHECKS))
+        _shine(tree, tree.node("ShaderNodeTexChecker", level, *CHECKER.values(), CHECKS), groups)
 
 
 def color_by_own(material, name, groups):

@@ -11,7 +11,7 @@ from ..core import PointCloudError
 from ..operators.deform.handles import handled_object
 from ..operators.objects.attributes import mode_number
 from ..operators.objects.result import read_eigenvalues
-from . import canvas, plots
+from . import canvas, editing, plots
 from .display import find_display, is_in_solid, range_node, shown_attribute, shown_values, without_unreached
 from .scale import shown_scale
 from .value_range import histogram
@@ -121,8 +121,10 @@ def _free_room(area, region):
 def shows_colors(obj, shading) -> bool:
     """Whether a view with some shading shows the colors of an object's points."""
     modifier = find_display(obj)
-    if modifier is None or not modifier.show_viewport or (obj.mode == "EDIT" and not modifier.show_in_editmode):
+    if modifier is None or not modifier.show_viewport:
         return False
+    if obj.mode == "EDIT" and not modifier.show_in_editmode:
+        return editing.is_drawn(obj, shading)
     return shading.type in {"MATERIAL", "RENDERED"} or (
         shading.type == "SOLID" and shading.color_type == "VERTEX" and is_in_solid(obj)
     )

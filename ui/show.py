@@ -30,10 +30,10 @@ from . import colormaps, legend, smooth, solid
 from .display import (
     NAME,
     component,
-    draws_discs,
     draws_faces,
     find_display,
     find_material,
+    is_cloud,
     is_colored,
     is_distance,
     is_in_solid,
@@ -166,7 +166,7 @@ def show_groups(obj):
         resize(obj)
         plain = True
     if plain and obj.meshfree.show_groups:
-        color_plain(_display_material(obj), _group_colors(obj))
+        color_plain(_display_material(obj), group_colors(obj))
         dim_back(_display_material(obj), obj.meshfree.dim_back)
         shade(_display_material(obj), obj.meshfree.shaded)
         obj.update_tag()
@@ -441,8 +441,7 @@ def _measure(obj):
 def reshape(obj):
     """Draw discs and strokes where chosen and known; no strokes while handles move the points, as they do not rotate.
 
-    In Edit Mode dots would hide the selection, and Blender 5.2 draws all of them as selected. So there they are only
-    drawn with the colors of groups, and for bound objects.
+    Clouds in Edit Mode are drawn by ui/editing.py.
     """
     modifier, deform = find_display(obj), find_deform(obj)
     if deform is not None and not is_baked(obj):
@@ -462,8 +461,7 @@ def reshape(obj):
             set_input(modifier, SOLID_NAME, "")
         if has_input(group, SPLATS):
             set_input(modifier, SPLATS, formed and has_splats(obj.data))
-        dots, bound = not (discs and draws_discs(obj)), deform is not None
-        modifier.show_in_editmode = obj.type != "MESH" or not dots or bound or obj.meshfree.show_groups
+        modifier.show_in_editmode = not is_cloud(obj)
         if has_input(group, STROKES):
             stroked = known and deform is None and _has_strokes(obj)
             set_input(modifier, STROKES, shown_attribute(obj) if stroked else "")
@@ -487,9 +485,24 @@ def _sized_by_hand(obj):
     return not math.isclose(get_input(find_display(obj), "Radius"), _radius(obj.meshfree), rel_tol=1e-5)
 
 
+def colors_and_range(name, values, shown, settings):
+    """Return the color map for the displayed numbers of an attribute, its range, and the numbers that count for it."""
+    locked = settings.range_low, settings.range_high
+    chosen = [settings.color_map, settings.range_mode]
+    if quantity(name).color_range == "symmetric":  # centered on zero, even if all values have one sign
+        chosen = [
+            choice if choice != "AUTO" else auto
+            for choice, auto in zip(chosen, ("COOL_WARM", "SYMMETRIC"), strict=True)
+        ]
+    if _are_lidar_classes(name, values) and settings.color_map == "AUTO":
+        chosen[0] = "LIDAR"
+    counted, distance = without_unreached(name, shown), is_distance(name, values, component(name, settings))
+    return *fit_range(counted, *chosen, settings.coverage, locked, distance), counted
+
+
 def _color(obj, name, values):
     _measure(obj)
-    settings, material, groups = obj.meshfree, _display_material(obj), _group_colors(obj)
+    settings, material, groups = obj.meshfree, _display_material(obj), group_colors(obj)
     settings.colors_behind = in_edit_mesh(obj)
     part = component(name, settings)
     shown, stepped, colors_of = None if values is None else numbers(values, part), False, None
@@ -501,17 +514,7 @@ def _color(obj, name, values):
         color_by_direction(material, name, groups)
         colors_of = solid.direction_colors
     else:
-        locked = settings.range_low, settings.range_high
-        chosen = [settings.color_map, settings.range_mode]
-        if quantity(name).color_range == "symmetric":  # centered on zero, even if all values have one sign
-            chosen = [
-                choice if choice != "AUTO" else auto
-                for choice, auto in zip(chosen, ("COOL_WARM", "SYMMETRIC"), strict=True)
-            ]
-        if _are_lidar_classes(name, values) and settings.color_map == "AUTO":
-            chosen[0] = "LIDAR"
-        counted = without_unreached(name, shown)
-        color_map, low, high = fit_range(counted, *chosen, settings.coverage, locked, is_distance(name, values, part))
+        color_map, low, high, counted = colors_and_range(name, values, shown, settings)
         if settings.range_mode != "LOCKED":
             settings.range_low, settings.range_high = (0.0, 0.0) if all_zero(counted) else (low, high)
         component_shown, stepped = part if values.ndim > 1 else "", color_map in STEPPED
@@ -557,7 +560,7 @@ def _display_material(obj):
     return material
 
 
-def _group_colors(obj) -> dict:
+def group_colors(obj) -> dict:
     """Return the colours of groups by name: none if they are not shown, and only the first ones of very many.
 
     Missing groups are included while there is room, so that assigned points are coloured at once, except those that

@@ -424,12 +424,17 @@ def _is_opaque_cloud(context):
     space = context.space_data
     if space is None or space.type != "VIEW_3D" or context.region_data is None:
         return False
-    shading = space.shading
-    through = shading.show_xray_wireframe if shading.type == "WIREFRAME" else shading.show_xray
-    if shading.type in ("SOLID", "WIREFRAME") and through:
+    if sees_through(space.shading):
         return False
     meshes = [bmesh.from_edit_mesh(obj.data) for obj in edited_objects(context) if obj.type == "MESH"]
     return not meshes or (context.tool_settings.mesh_select_mode[0] and not any(len(mesh.edges) for mesh in meshes))
+
+
+def sees_through(shading) -> bool:
+    """Whether a view with some shading has X-ray on."""
+    if shading.type == "WIREFRAME":
+        return shading.show_xray_wireframe
+    return shading.type == "SOLID" and shading.show_xray
 
 
 def _put_selection(obj, known, wanted):

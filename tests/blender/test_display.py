@@ -105,8 +105,6 @@ def test_a_limited_viewport_draws_dots_from_half_its_limit_on_and_renders_draw_d
     obj.meshfree.point_size = obj.meshfree.point_size  # tells of it
     faces = len(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.polygons)
     assert (faces, len(display_points(obj))) == ((1000 * FACES, 0) if kind == "discs" else (0, 1))
-    modifier = display.find_display(obj)
-    assert modifier.show_in_editmode == (kind == "discs")
     assert rendered_faces(obj) == 1000 * FACES
 
 
@@ -123,15 +121,14 @@ def test_dots_in_place_of_discs_are_as_large_as_these(display, modifiers, obj):
     assert filled == pytest.approx(1.5 * spacing * reach, rel=1e-5)
 
 
-def test_dots_hide_no_selection_in_edit_mode(display, obj):
+def test_clouds_are_not_drawn_by_nodes_in_edit_mode(display, obj):
     modifier = display.find_display(obj)
-    assert not modifier.show_in_editmode
-    obj.meshfree.point_shape = "DISCS"
-    assert modifier.show_in_editmode
-    obj.meshfree.point_shape = "DOTS"
-    assert not modifier.show_in_editmode
-    obj.meshfree.show_groups = True  # asked for
-    assert modifier.show_in_editmode
+    for shape, groups in (("DISCS", False), ("DOTS", False), ("DOTS", True)):
+        obj.meshfree.point_shape, obj.meshfree.show_groups = shape, groups
+        assert not modifier.show_in_editmode
+    meshed = add_object(sphere_points(40), faces=[(0, 1, 2)])
+    part("ui.show").show_surface(meshed)
+    assert display.find_display(meshed).show_in_editmode
 
 
 def test_no_loose_vertex_is_drawn_over_the_points(obj):
