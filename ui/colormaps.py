@@ -27,14 +27,14 @@ _LIDAR = (
     " ffc1e3 00b3b3 99004d 66ccff c98a4b e0ffff 9370db 004d4d 808000 00e6b8 ff6680 2b6f99 c8a200 c71585 1a3320"
 )
 _TRUTH = ("bdbdbd", "d55e00")
-# The same for groups of points, by the names of `operators.groups`.
+# The same for groups of points, by the names of `operators.groups`; none like Blender's orange of selected points.
 _GROUPS = {
-    "Handle": "d55e00",
+    "Handle": "b10026",
     "Anchor": "0072b2",
     "Fixed": "009e73",
     "Source": "f0e442",
     "Low": "332288",
-    "High": "e69f00",
+    "High": "ffffff",
     "Value": "cc79a7",
     "Boundary": "56b4e9",
 }

@@ -39,6 +39,7 @@ class MESHFREE_PT_points(SidebarPanel, bpy.types.Panel):
     def draw(self, context):
         layout, obj = self.layout, context.object
         draw_tools(layout, self.bl_label)
+        _draw_clip(layout)
         draw_selection(layout, context)
         layout.prop(obj.meshfree, "show_groups")
         column = layout.column(align=True)
@@ -48,6 +49,13 @@ class MESHFREE_PT_points(SidebarPanel, bpy.types.Panel):
             to_mesh = obj.type != "MESH"
             text = "Convert to Mesh" if to_mesh else "Convert to Point Cloud"
             layout.operator("meshfree.convert", text=text).target = "MESH" if to_mesh else "POINTCLOUD"
+
+
+def _draw_clip(layout):
+    """Draw the button of Blender's clipping region, which keeps what lies in a box that one drags."""
+    row = layout.row()
+    row.operator_context = "INVOKE_REGION_WIN"
+    row.operator("view3d.clip_border", text="Clip to Box")
 
 
 def _draw_group(row, obj, role, title):

@@ -13,3 +13,4 @@ from .selection import grow as grow
 from .selection import opposite_ends as opposite_ends
 from .transport import logarithmic_map as logarithmic_map
 from .transport import transport as transport
+from .visibility import seen_points as seen_points

@@ -14,7 +14,10 @@ from ...core import PointCloudError
 from ...tools.groups import HANDLE, SOURCE
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import (
+    DISC,
     SELECTION,
+    has_vectors,
+    own_positions,
     point_count,
     positions_now,
     read_attribute,
@@ -33,13 +36,15 @@ from ..objects.groups import (
     rivals,
 )
 from ..objects.handlers import notify
-from ..objects.reading import obstacle, sharing_objects
+from ..objects.reading import obstacle, sharing_objects, spacing
 from ..objects.splats import read_splats
 from ..registration import Registration, Row
 from ..running.application import compute_all, operator_reader
 from ..running.job import JobOperator
 from ..running.ready import ReadyOperator, reporting
 from ..running.stages import Stages
+
+_LOOSE = 2.0  # spacings: radius of points whose surface is not known, among which random ones leave few holes
 
 
 class SelectionOperator(JobOperator):
@@ -233,8 +238,8 @@ class MESHFREE_OT_select_component(SelectionOperator, bpy.types.Operator):
         return lambda: select(context, obj, chosen | np.isin(component, found))
 
 
-class FrontOnly:
-    """The property of operators that leave out points facing away from the view."""
+class OnSurface:
+    """The property of operators that leave out points behind the surface, as seen from the view."""
 
     direction: FloatVectorProperty(
         name="Viewing Direction",
@@ -243,39 +248,61 @@ class FrontOnly:
         subtype="XYZ",
     )
 
-    def facing(self, context, obj):
-        """Return which points face the view by their normals, (n,) bool."""
-        reading, laplacian = analyzed(context, obj)
-        view = np.array(self.direction, dtype=np.float64)
-        space = context.space_data.region_3d if context.area is not None and context.area.type == "VIEW_3D" else None
-        if view.any():
-            rays = view
-        elif space is None:
+    def seen(self, context, obj, chosen):
+        """Return which of the chosen points of an object are seen, (n,) bool: not hidden, clipped or behind others."""
+        world, data = np.array(obj.matrix_world), obj.data
+        points = own_positions(data) @ world[:3, :3].T + world[:3, 3]
+        view, eye = self._view(context)
+        points[_hidden(obj)] = np.nan
+        if eye is not None or not any(self.direction):
+            points[_clipped(context.space_data.region_3d, points)] = np.nan
+        scale = np.cbrt(abs(np.linalg.det(world[:3, :3])))
+        radii, normals = np.full(len(points), _LOOSE), None
+        if has_vectors(data, DISC):
+            discs = read_attribute(data, DISC)
+            reach = np.linalg.norm(discs, axis=1)
+            radii = np.where(reach > 0.0, reach * obj.meshfree.point_size, _LOOSE)
+            normals = discs @ np.linalg.pinv(world[:3, :3])
+        radii *= scale * (obj.meshfree.spacing or spacing(data))
+        return core.distance.seen_points(points, radii, view, eye, normals, chosen)
+
+    def _view(self, context):
+        """Return the direction of view, and the eye of a perspective one, in the world."""
+        if any(self.direction):
+            return np.array(self.direction, dtype=np.float64), None
+        if context.area is None or context.area.type != "VIEW_3D":
             raise PointCloudError("There is no 3D viewport to look from. Give a viewing direction.")
-        elif space.is_perspective:
-            eye = np.array(space.view_matrix.inverted().translation) - np.array(obj.matrix_world.translation)
-            rays = reading.points - eye
-        else:
-            rays = -np.array(space.view_matrix.inverted().col[2][:3])
-        return np.einsum("ij,ij->i", laplacian.normals, np.broadcast_to(rays, reading.points.shape)) < 0.0
+        region = context.space_data.region_3d
+        placed = np.array(region.view_matrix.inverted())
+        return -placed[:3, 2], placed[:3, 3] if region.is_perspective else None
 
 
-class MESHFREE_OT_select_front(SelectionOperator, FrontOnly, bpy.types.Operator):
-    """Deselect points facing away from the view, which Box Select selects too"""
+def _clipped(region, points):
+    """Return which points in the world a view cuts off by its clipping region, (n,) bool."""
+    if not region.use_clip_planes:
+        return np.zeros(len(points), dtype=bool)
+    planes = np.array([list(plane) for plane in region.clip_planes[:4]])
+    return (points @ planes[:, :3].T + planes[:, 3] <= 0.0).any(axis=1)
+
+
+class MESHFREE_OT_select_front(SelectionOperator, OnSurface, bpy.types.Operator):
+    """Deselect points behind the surface, which are not seen from the view and which Box Select selects too"""
 
     bl_idname = "meshfree.select_front"
-    bl_label = "Front Only"
+    bl_label = "Select on Surface"
+    surface = False
 
     def prepare(self, context, obj):
-        front = selected(obj) & self.facing(context, obj)
+        front = self.seen(context, obj, selected(obj))
         return lambda: select(context, obj, front)
 
 
-class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.Operator):
+class MESHFREE_OT_group_from_selection(SelectionOperator, OnSurface, bpy.types.Operator):
     """Assign the selected points to a group that the tools use, such as Handle or Anchor"""
 
     bl_idname = "meshfree.group_from_selection"
     bl_label = "Assign to Group"
+    surface = False
 
     role: EnumProperty(
         name="Group",
@@ -306,7 +333,9 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
     weight: FloatProperty(
         name="Weight", description="Weight of the points in the group", default=1.0, min=0.0, max=1.0, subtype="FACTOR"
     )
-    front_only: BoolProperty(name="Front Only", description="Leave out points facing away from the view", default=False)
+    front_only: BoolProperty(
+        name="On Surface", description="Leave out points behind the surface, as seen from the view", default=False
+    )
 
     @classmethod
     def description(cls, context, properties):
@@ -316,19 +345,14 @@ class MESHFREE_OT_group_from_selection(SelectionOperator, FrontOnly, bpy.types.O
             "REMOVE": "Remove the selected points from the group",
         }.get(properties.action, "")
 
-    @property
-    def surface(self):
-        """Whether it needs the Laplacian, for the normals."""
-        return self.front_only
-
     def prepare(self, context, obj):
         chosen = selected(obj)
         if self.front_only:
-            chosen &= self.facing(context, obj)
+            chosen = self.seen(context, obj, chosen)
             if not chosen.any():
                 raise PointCloudError(
-                    f'All selected points of "{obj.name}" face away from the view. Turn off Front Only, or view them'
-                    " from the other side."
+                    f'No selected points of "{obj.name}" are seen from the view. Turn off On Surface, or view them from'
+                    " the other side."
                 )
         role = self.role.title()
         name = self.name or role

@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 
 from tests.blender.clouds import add_group, add_object, attribute, local_points, sphere_points
 from tests.blender.conftest import part
+from tests.blender.test_colormaps import oklab
 
 SOLID = SimpleNamespace(type="SOLID", show_xray=False)
 
@@ -81,6 +82,13 @@ def test_points_of_groups_have_the_colors_of_these(look, obj):
     assert_allclose(colors[[3, 5]], [color("Handle"), color("Anchor")], rtol=1e-6)
     assert (colors[4] != plain).any()
     assert_allclose(colors[0], plain)
+
+
+def test_no_group_looks_selected():
+    chosen = part("ui.colormaps").to_linear(bpy.context.preferences.themes[0].view_3d.vertex_select)
+    for role in part("tools.groups").ROLES:
+        difference = np.diff(oklab([color(role), chosen]), axis=0)
+        assert np.linalg.norm(difference) > 0.15, role
 
 
 @pytest.mark.any_blender

@@ -64,7 +64,8 @@ class Layout:
         self.prop(data, path)
 
     def operator(self, idname, text=None, icon="NONE", icon_value=0, depress=False):
-        kind = getattr(bpy.ops.meshfree, idname.removeprefix("meshfree.")).get_rna_type()
+        group, name = idname.split(".")
+        kind = getattr(getattr(bpy.ops, group), name).get_rna_type()
         self.texts.append(text if text is not None else kind.name)
         return SimpleNamespace(**dict.fromkeys(item.identifier for item in kind.properties))
 

@@ -512,6 +512,12 @@ def calls():
     )
     yield core.distance.opposite_ends, on, {"share": 0.05}
     yield core.distance.front_point, {}, {"points": points, "eye": [0, 0, 5], "direction": [0, 0, -1], "reach": 0.1}
+    yield core.distance.seen_points, {}, {"points": points, "radii": 0.1, "direction": [0, 0, -1], "eye": [0, 0, 5]}
+    yield (
+        core.distance.seen_points,
+        {"points": points, "direction": [0, 0, -1]},
+        {"radii": low * 0 + 0.1, "normals": points, "among": top},
+    )
     corners = np.random.default_rng(0).integers(n, size=(40, 3))
     yield core.measure.iso_lines, {}, {"vertices": points, "faces": corners, "values": low, "levels": [0.0, 0.1]}
     yield core.measure.Slopes, {"discs": core.surface.surface_discs(points)}, {"points": points}

@@ -122,3 +122,61 @@ class TestFrontPoint:
     def test_nothing_behind_the_eye_far_from_the_ray_or_without_a_place(self):
         points = np.array([[0.0, 0.0, 9.0], [3.0, 0.0, 0.0], [np.nan, 0.0, 0.0], [np.inf, 0.0, 0.0]])
         assert core.distance.front_point(points, [0.0, 0.0, 5.0], [0.0, 0.0, -1.0], 0.5) == -1
+
+
+class TestSeenPoints:
+    """What is seen of a surface, by hidden surfaces whose answer is known."""
+
+    DOWN = np.array([0.0, 0.0, -1.0])
+
+    @pytest.mark.parametrize("normals", [True, False])
+    @pytest.mark.parametrize("eye", [None, 3.0])
+    def test_of_a_sphere_the_half_that_faces_the_view(self, normals, eye):
+        points = core.example_sphere(2000)
+        horizon = 0.0 if eye is None else 1.0 / eye  # where rays from the eye touch the sphere
+        given = {"normals": points} if normals else {}
+        place = {} if eye is None else {"eye": [0.0, 0.0, eye]}
+        seen = core.distance.seen_points(points, 1.2 * np.sqrt(4.0 * np.pi / 2000), self.DOWN, **given, **place)
+        assert seen[points[:, 2] > horizon + 0.2].all()
+        assert not seen[points[:, 2] < horizon - 0.25].any()
+
+    @pytest.mark.parametrize(("elevation", "normals"), [(30, True), (30, False), (12, True)])
+    def test_ground_is_seen_at_a_low_angle(self, elevation, normals):
+        ground = np.column_stack([np.random.default_rng(0).uniform(-1.0, 1.0, (4000, 2)), np.zeros(4000)])
+        angle = np.radians(elevation)
+        up = np.tile([0.0, 0.0, 1.0], (4000, 1)) if normals else None
+        view = [np.cos(angle), 0.0, -np.sin(angle)]
+        assert core.distance.seen_points(ground, 1.3 * np.sqrt(4.0 / 4000), view, normals=up).mean() > 0.99
+
+    def test_a_sheet_hides_the_next_one_and_what_is_asked_for_is_told(self):
+        grid = np.mgrid[-1:1:40j, -1:1:40j].reshape(2, -1).T
+        spacing = 2.0 / 39.0
+        sheets = np.concatenate([np.column_stack([grid, np.full(1600, height)]) for height in (0.0, -2.0 * spacing)])
+        asked = np.arange(3200) % 2 == 0
+        up = np.tile([0.0, 0.0, 1.0], (3200, 1))
+        seen = core.distance.seen_points(sheets, spacing, self.DOWN, normals=up, among=asked)
+        assert (seen == (asked & (sheets[:, 2] == 0.0))).all()
+        below = core.distance.seen_points(sheets, spacing, -self.DOWN, normals=up)
+        assert (below == (sheets[:, 2] < 0.0)).all()
+
+    def test_it_takes_lengths_of_any_unit(self):
+        points = core.example_sphere(500)
+        first = core.distance.seen_points(points, 0.2, self.DOWN)
+        assert (core.distance.seen_points(1e6 * points, 2e5, 3.0 * self.DOWN) == first).all()
+        assert (core.distance.seen_points(1e-6 * points, 2e-7, self.DOWN) == first).all()
+
+    def test_from_within_a_sphere_what_is_before_the_eye_and_nothing_behind_it(self):
+        points = core.example_sphere(500)
+        seen = core.distance.seen_points(points, 0.15, self.DOWN, eye=[0.0, 0.0, 0.0])
+        assert not seen[points[:, 2] >= 0.0].any()
+        assert seen[points[:, 2] < -0.3].all()
+
+    def test_points_without_a_place_neither_hide_nor_are_seen(self):
+        points = np.array([[0.0, 0.0, 2.0], [np.nan, 0.0, 1.0], [0.0, 0.0, np.inf], [0.0, 0.0, 0.0], [0.01, 0.0, -1.0]])
+        seen = core.distance.seen_points(points, 0.1, self.DOWN)
+        assert seen.tolist() == [True, False, False, False, False]
+        assert not core.distance.seen_points(points[1:3], 0.1, self.DOWN).any()
+
+    def test_a_direction_of_no_length(self):
+        with pytest.raises(core.PointCloudError, match="has zero length"):
+            core.distance.seen_points(np.eye(3), 0.1, [0.0, 0.0, 0.0])
