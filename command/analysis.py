@@ -82,8 +82,8 @@ def floating_notices(out: Array) -> list[str]:
     if not len(out):
         return []
     return [
-        f"Floaters left out of the operator (nearly transparent, huge or isolated splats): {len(out):,}. Select"
-        " Floaters selects them. They move with the nearest splats."
+        f"Floaters left out (nearly transparent, huge or isolated splats): {len(out):,}. They move with the nearest"
+        " splats, and Select Floaters selects them."
     ]
 
 

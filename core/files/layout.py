@@ -136,8 +136,8 @@ def find_layout(rows: Rows, usual: dict[int, tuple[str, ...]]) -> Layout:
         notices.append(f"{rows.path.name}: skipped {brief(repr(skipped[0]))}, before the first point.")
     if rows.sample[0] == [str(index) for index in range(rows.width)] and not any(names):
         notices.append(
-            f"{rows.path.name}: its first row, {' '.join(rows.sample[0])}, is read as a point. Delete it from the file"
-            " if it numbers the columns."
+            f"{rows.path.name}: its first row, {' '.join(rows.sample[0])}, is read as a point. If it numbers the"
+            " columns, delete it from the file."
         )
     return layout
 

@@ -45,5 +45,5 @@ def doubt_notices(doubt: Ints, areas: Floats) -> list[str]:
     share = "" if shares[largest] > 0.9 * doubtful else f", on {shares[largest]:.0%}"
     return [
         f"On {doubtful:.0%} of the surface the results are in doubt{share} since {_CAUSES[largest]}"
-        " LaplaceBeltrami.doubt tells where, and why."
+        " LaplaceBeltrami.doubt tells where."
     ]

@@ -201,7 +201,7 @@ class TestIslands:
 class TestLonePoints:
     def test_a_notice_counts_them(self, parts):
         assert [notice for notice in parts.notices if "left out" in notice] == [
-            "Outliers and small components left out of the operator: 4 (0.17 %)."
+            "Outliers and small components left out: 4 (0.17 %)."
         ]
 
     def test_neutral_values(self, parts, spectrum):

@@ -131,7 +131,7 @@ def test_they_do_not_join_components():
 def test_a_notice_tells_how_many_and_their_share():
     surface = fibonacci_sphere(900)
     (notice,) = core.build_laplacian(np.concatenate([surface, 1.3 * surface[::9]])).notices
-    assert notice.endswith("left out of the operator: 100 (10 %).")
+    assert notice.endswith("left out: 100 (10 %).")
 
 
 def test_noise_is_measured_without_them():

@@ -451,7 +451,7 @@ def test_what_is_wrong_with_some_files_of_a_delivery_is_told_and_the_others_done
     found = np.concatenate([table.points for table in tables])[on]
     np.testing.assert_array_equal(np.sort(found, axis=0), np.sort(rod, axis=0))
     lines = [json.loads(text) for text in (out / "tiles.jsonl").read_text().splitlines()]
-    assert any("left out of the operator: 3 " in notice for record in lines for notice in record.get("notices", ()))
+    assert any("components left out: 3 " in notice for record in lines for notice in record.get("notices", ()))
     assert run("report", out)[1][0]["failed"] == 2 + len(full)
 
 
