@@ -19,10 +19,12 @@ def _modules():
     from .operators.objects import counting, motion, motion_files, notices, settings
     from .operators.running import cache, discs, job
     from .ui import (
+        advanced,
         applications,
         colormap,
         drag,
         editing,
+        groups,
         iso_lines,
         keys,
         legend,
@@ -30,12 +32,12 @@ def _modules():
         menus,
         overlay,
         panel,
-        points,
         preferences,
         presets,
         range_selection,
         rig,
         show,
+        showing,
     )
     from .ui import deform as deform_panel
 
@@ -68,10 +70,12 @@ def _modules():
         measures,
         presets,
         panel,
-        points,
+        showing,
+        groups,
         applications,
         deform_panel,
         rig,
+        advanced,
         menus,
         keys,
         editing,

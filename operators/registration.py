@@ -2,18 +2,10 @@
 
 from dataclasses import dataclass
 from itertools import groupby
-from typing import NamedTuple
+
+from ..tools.tool import Row as Row
 
 _registered = []
-
-
-class Row(NamedTuple):
-    """The position of a tool: panel or menu, group of rows in it, and index in that, from 1."""
-
-    home: str
-    group: int
-    place: int
-    text: str = ""  # of the button, if not the label of the operator
 
 
 @dataclass(frozen=True)

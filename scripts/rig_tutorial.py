@@ -40,8 +40,9 @@ def weigh(gui, quote, keep):
     quote("Ctrl-click *Armature* in the Outliner")
     _outliner(gui, "Armature", "ctrl")
     gui.wait_until(f"bpy.context.object.type == 'ARMATURE' and {CORAL}.select_get()")
-    quote("Open *Rig*")
+    quote("Open *Move*")
     gui.open_panel("meshfree.auto_weights")
+
     quote("press *Automatic Weights...*")
     gui.press("meshfree.auto_weights")
     quote("then Return")

@@ -13,6 +13,11 @@ SAMPLE = ROOT / "docs" / "coral.ply"
 CORAL = "bpy.data.objects['coral']"
 HANDLE = "bpy.data.objects['coral Handle']"
 WORKING = "len(main_window().modal_operators)"
+SHOWN = """
+import sys
+display = next(module for name, module in sys.modules.items() if name.endswith("ui.display"))
+display.shown_attribute(bpy.context.object)
+"""
 MOVED = f"np.linalg.norm(attribute({CORAL}, 'lb_displacement'), axis=1).max()"
 # Buttons of the top bar, and of the menu *File*, from which others open to the right.
 _FILE, _NEW, _GENERAL, _IMPORT = (46, 14), (70, 38), (300, 37), (80, 311)
@@ -122,9 +127,18 @@ def analyze(gui, quote, keep):
     quote(f"{gui.python(f'{CORAL}.meshfree.total_area'):.1f} m²")
     gui.point_at_view()
     keep("colors")
-    for words, name in (("Under *Display* press", "lb_area"), ("*Mean Curvature* again", "lb_mean_curvature")):
+    for words, name in (("Click the list under *Show* and choose", "Area"), ("again", "Mean Curvature")):
         quote(words)
-        gui.press(f'meshfree.colormap(attribute="{name}"')
+        show(gui, name)
+
+
+def show(gui, name):
+    """Choose a result in the list under Show, left of the arrows and of the button for a new range."""
+    x, y = gui.find_button("meshfree.colormap()", across=0.83)
+    gui.click(x - 0.5 * gui.region("UI")[2], y)
+    gui.type(name)
+    gui.key("Return")
+    gui.wait_for(lambda: gui.python(SHOWN) == f"lb_{name.lower().replace(' ', '_')}", f"{name} is shown", 60)
 
 
 def choose(gui, quote, keep):
@@ -136,18 +150,20 @@ def choose(gui, quote, keep):
     quote("and Tab")
     gui.key("Tab")
     gui.wait_until(f"{CORAL}.mode == 'EDIT'")
-    quote("Open *Points and Groups*")
-    gui.open_panel("meshfree.select_grow")
+    quote("Under *Show* open *Points*")
+    gui.open_panel(".meshfree.show_groups")
     quote("switch on *Group Colors*")
-    gui.press(".meshfree.show_groups")
+    gui.press(".meshfree.show_groups", across=0.6)
     gui.wait_until(f"{CORAL}.meshfree.show_groups")
+    quote("Then open *Move*")
+    gui.open_panel(".meshfree.deform.handles")
     quote("press B")
     gui.point_at_view()
     gui.key("b")
     quote("drag a box around the right half of the points")
     _box(gui, (0.2, -2.2), (2.2, 2.2))
     quote("Press *Assign to Anchors*")
-    gui.press("meshfree.group_from_selection(role='ANCHOR'")
+    _find(gui, gui.press, "meshfree.group_from_selection(role='ANCHOR'")
     quote("press Alt+A")
     gui.point_at_view()
     gui.key("alt+a")
@@ -156,11 +172,11 @@ def choose(gui, quote, keep):
     quote("drag a box around the tip of the arm at the lower left")
     _box(gui, (-2.2, -1.3), (-1.3, 0.0))
     quote("Press *Assign to Handles*")
-    gui.press("meshfree.group_from_selection(role='HANDLE'")
+    _find(gui, gui.press, "meshfree.group_from_selection(role='HANDLE'")
     gui.point_at_view()
     keep("groups")
     quote("Switch *Group Colors* off again")
-    gui.press(".meshfree.show_groups")
+    _find(gui, lambda button: gui.press(button, across=0.6), ".meshfree.show_groups")
     gui.wait_until(f"not {CORAL}.meshfree.show_groups")
     quote("press Tab")
     gui.point_at_view()
@@ -193,9 +209,7 @@ def _find(gui, press, button):
 
 def bend(gui, quote, keep):
     """Step 4: bind, move and rotate."""
-    quote("Open *Bend*")
-    _find(gui, gui.open_panel, ".meshfree.deform.handles")
-    quote("press *Bind*")
+    quote("Press *Bind* under *Bend*")
     _find(gui, gui.press, "meshfree.deform_bind")
     gui.wait_until("'coral Handle' in bpy.data.objects", 240)
     gui.wait_until(f"not {WORKING}")
@@ -217,8 +231,8 @@ def color(gui, quote, keep):
     quote("Click the coral")
     gui.click(*gui.python("on_screen((0.0, 0.0, 0.3))"))
     gui.wait_until("bpy.context.object.name == 'coral'")
-    quote("press *Displacement* under *Display*")
-    _find(gui, gui.press, 'meshfree.colormap(attribute="lb_displacement"')
+    quote("choose *Displacement* in the list under *Show*")
+    _find(gui, lambda name: show(gui, name), "Displacement")
     gui.point_at_view()
     keep("display")
     quote("Press *Apply* under *Bend*")
@@ -228,8 +242,8 @@ def color(gui, quote, keep):
     _find(gui, gui.press, "meshfree.analyze")
     gui.wait_until(WORKING)
     gui.wait_until(f"not {WORKING}", 240)
-    quote("and *Mean Curvature* under *Display*")
-    _find(gui, gui.press, 'meshfree.colormap(attribute="lb_mean_curvature"')
+    quote("and choose *Mean Curvature* in that list")
+    _find(gui, lambda name: show(gui, name), "Mean Curvature")
 
 
 def render(gui, quote, keep):
@@ -242,6 +256,8 @@ def render(gui, quote, keep):
     quote("press Ctrl+Alt+Numpad 0")
     gui.key("ctrl+alt+KP_0")
     gui.wait_until("view3d()[0].spaces.active.region_3d.view_perspective == 'CAMERA'")
+    quote("Under *Show* open *Legend*")
+    _find(gui, gui.open_panel, ".meshfree.legend")
     quote("set *Standard* right there")
     _find(gui, lambda button: _choose_standard(gui, button), ".view_settings.view_transform")
     quote("Press *Legend in Renders*")
@@ -269,7 +285,8 @@ STEPS = (import_sample, analyze, choose, bend, color, render)
 
 def play(gui, keep, page="tutorial.md", steps=STEPS):
     """Play all steps of a page; `keep` gets the name of each picture that it has."""
-    gui.open_panels("MESHFREE_PT_display")  # the one that is open before anybody opens or closes some
+    # Those that are open before anybody opens or closes some.
+    gui.open_panels("MESHFREE_PT_display", "MESHFREE_PT_statistics", "MESHFREE_PT_select")
     gui.new_file()
     gui.python("bpy.context.preferences.view.filebrowser_display_type = 'SCREEN'")
     (gui.folder / SAMPLE.name).write_bytes(SAMPLE.read_bytes())  # where the file browser opens

@@ -352,18 +352,29 @@ class Window:
 
     def open_panel(self, first):
         """Open a closed panel of the sidebar by a click on its title; it is known by its first button or setting."""
-        x, top, width, height = self.region("UI")
-        for y in range(top + 8, top + height - 30, 9):
+        x, top, width, _ = self.region("UI")
+        for row in self.text_rows(50)[1:]:  # of the arrows before titles, but for that of all
+            y = top + row
             self.move(x + 0.35 * width, y)
             if self.python("button_under_mouse()"):
                 continue
             for _ in range(2):  # another panel is closed again
                 self.click(x + 0.35 * width, y)
-                for below in (22, 31, 57):  # a line of text may come first
+                for below in (22, 31, 57, 80):  # a line of text, or the title of a panel within, may come first
                     self.move(x + 0.65 * width, y + below)
                     if self.python("button_under_mouse()").startswith(_written(first)):
                         return
         raise WindowError(f"No panel begins with {first}")
+
+    def text_rows(self, width=None):
+        """Find the texts in the sidebar, or in its first pixels: how far their middles are below its upper edge."""
+        import numpy as np
+
+        self.point_at_view()
+        x, y, whole, height = self.region("UI")
+        bright = (self.pixels((x, y, width or whole - 30, height)).max(axis=2) > 125).sum(axis=1) > 1
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], bright, [False]]).astype(int))).reshape(-1, 2)
+        return [int(edge.mean()) for edge in edges if np.ptp(edge) > 4]
 
     def press(self, operator, region="UI", across=0.35):
         """Click on the button of an operator in the sidebar."""

@@ -17,6 +17,7 @@ import numpy as np
 TICK = 0.002  # seconds; waiting Blender looks every five milliseconds
 _requests, _answers = (int(word) for word in os.environ["MESHFREE_PIPES"].split())
 _buffer = b""
+_options = {}  # of panels, by their names, as they were registered first
 
 
 def main_window():
@@ -70,16 +71,23 @@ def button_under_mouse(region_type="UI"):
 
 
 def open_panels(names):
-    """Register the extension's panels again, so that these are open in the next file and no others."""
+    """Register the extension's panels again, so that these are open in the next file and no others.
+
+    Panels within others are as they always are, or open if they are among these.
+    """
     root = next(name for name in bpy.context.preferences.addons.keys() if name.endswith(".meshfree_laplacian"))
     classes = [cls for module in sys.modules[root]._modules() for cls in getattr(module, "CLASSES", ())]
     panels = [cls for cls in classes if issubclass(cls, bpy.types.Panel)]
+    names = names | {getattr(cls, "bl_parent_id", "") for cls in panels if cls.__name__ in names}
+    nested = {cls.__name__ for cls in panels if getattr(cls, "bl_parent_id", "")}
     for cls in reversed(panels):
         bpy.utils.unregister_class(cls)
     for cls in panels:
-        if getattr(cls, "bl_parent_id", ""):
-            others = set(getattr(cls, "bl_options", ())) - {"DEFAULT_CLOSED"}
-            cls.bl_options = others if cls.__name__ in names else others | {"DEFAULT_CLOSED"}
+        parent = getattr(cls, "bl_parent_id", "")
+        if parent:
+            options = _options.setdefault(cls.__name__, set(getattr(cls, "bl_options", ())))
+            closed = options if parent in nested else {"DEFAULT_CLOSED"}
+            cls.bl_options = options - {"DEFAULT_CLOSED"} | (set() if cls.__name__ in names else closed)
         bpy.utils.register_class(cls)
 
 

@@ -29,7 +29,7 @@ class AlignPoints(PointTool):
         ),
         Setting("scale", "Change the size, too, by one factor", False),
     )
-    panel, menu = Row("Measure", 5, 1), Row("Object", 2, 3)
+    panel, menu = Row("Two Scans", 1, 1), Row("Object", 2, 3)
     bytes_a_point = 500
     keeps_line = extended = True
 

@@ -65,7 +65,7 @@ class Compare(PointTool):
             at_zero="Any",
         ),
     )
-    panel, menu = Row("Measure", 5, 2), Row("Object", 2, 4)
+    panel, menu = Row("Two Scans", 1, 2), Row("Object", 2, 4)
     keeps_line = extended = True
 
     def writes(self, own: Any) -> tuple[str, ...]:

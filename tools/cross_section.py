@@ -15,7 +15,7 @@ class CrossSection(Tool):
 
     name, verb, label = "cross_section", "section", "Cross Section"
     help = "Cut the surface by a plane: curves, with their length and the area that they enclose"
-    panel, menu = Row("Measure", 6, 2), Row("Object", 7, 5)
+    panel, menu = Row("Measure", 2, 1), Row("Object", 7, 5)
     keeps_line = extended = True
 
     def inputs(self, cloud: Cloud, own: Any) -> Any:

@@ -28,7 +28,7 @@ class ExtendDirection(Tool):
         ),
     )
     reads = ("sources",)
-    panel, menu = Row("Measure", 3, 3), Row("Object", 7, 4)
+    panel, menu = Row("Advanced", 2, 5), Row("Object", 7, 4)
 
     def inputs(self, cloud: Cloud, own: Any) -> Any:
         return cloud.sources(own.group)

@@ -19,7 +19,7 @@ class GeodesicDistance(Tool):
     help = "Geodesic distance from a group of points, or from the selected ones"
     settings = (source_setting("Vertex group of the sources"),)
     reads = ("sources",)
-    panel, menu = Row("Measure", 2, 1), Row("Object", 6, 1)
+    panel, menu = Row("Advanced", 2, 1), Row("Object", 6, 1)
 
     def inputs(self, cloud: Cloud, own: Any) -> Any:
         sources = cloud.sources(own.group)

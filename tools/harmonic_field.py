@@ -45,7 +45,7 @@ class HarmonicField(Tool):
             "",
         ),
     )
-    panel, menu = Row("Measure", 2, 3), Row("Object", 6, 2)
+    panel, menu = Row("Advanced", 2, 3), Row("Object", 6, 2)
 
     def asks(self, own: Any) -> tuple[str, ...]:
         ends, weights = ("low_group", "high_group"), ("group",)

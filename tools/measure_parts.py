@@ -66,7 +66,7 @@ class MeasureParts(Tool):
             label="Attribute",
         ),
     )
-    panel, menu = Row("Measure", 6, 1), Row("Object", 3, 5)
+    panel, menu = Row("Measure", 2, 2), Row("Object", 3, 5)
     extended = True
 
     def inputs(self, cloud: Cloud, own: Any) -> Any:

@@ -45,7 +45,7 @@ class MeshSurface(Tool):
             high=4.0,
         ),
     )
-    panel, menu = Row("Mesh", 1, 1), Row("Object", 2, 1)
+    panel, menu = Row("Make", 1, 1), Row("Object", 2, 1)
     extended = True
 
     def adjustable(self, own: Any) -> tuple[str, ...]:

@@ -28,7 +28,7 @@ class MinimalSurface(MovingTool):
         ),
         Setting("steps", "Maximum number of steps", 100, 1, high=500),
     )
-    panel, menu = Row("Minimal Surface", 1, 1), Row("Object", 11, 1)
+    panel, menu = Row("Advanced", 4, 1), Row("Object", 11, 1)
 
     def inputs(self, cloud: Cloud, own: Any) -> Any:
         """Return the points that stay, (n,) bool, or None; options for the steps; and what errors name."""

@@ -30,7 +30,7 @@ class ModeShape(MovingTool):
             "phase", "Angle of the vibration: 0 is full displacement, 180 degrees the opposite one", 0.0, form="DEGREES"
         ),
     )
-    panel, menu = Row("Spectrum", 1, 1), Row("Object", 4, 2)
+    panel, menu = Row("Move", 1, 2), Row("Object", 4, 2)
     extended = True
 
     def inputs(self, cloud: Cloud, own: Any) -> bool:

@@ -17,7 +17,7 @@ class NearestSource(Tool):
     help = "Divide the surface into geodesic Voronoi cells of the sources"
     settings = (source_setting("Vertex group with the points that are centers of cells"),)
     reads = ("sources",)
-    panel, menu = Row("Measure", 3, 1), Row("Object", 7, 2)
+    panel, menu = Row("Advanced", 2, 4), Row("Object", 7, 2)
 
     def inputs(self, cloud: Cloud, own: Any) -> Any:
         return cloud.sources(own.group)

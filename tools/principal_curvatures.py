@@ -29,7 +29,7 @@ class PrincipalCurvatures(Tool):
             choices=tuple(Choice(value, label, quantity(name).tooltip) for value, (label, name) in _SHOWN.items()),
         ),
     )
-    panel, menu, quick = Row("Measure", 1, 1), Row("Object", 3, 1), Row("Object", 1, 3, "Curvature")
+    panel, menu = Row("Measure", 3, 1), Row("Object", 3, 1)
 
     def shown(self, own: Any) -> str:
         return _SHOWN[own.display][1]

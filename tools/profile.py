@@ -66,7 +66,7 @@ class Profile(Tool):
             label="Height Along",
         ),
     )
-    panel, menu = Row("Points and Groups", 2, 3), Row("Points", 2, 3)
+    panel, menu = Row("Measure", 1, 3), Row("Points", 2, 3)
     extended = True
 
     def inputs(self, cloud: Cloud, own: Any) -> Any:

@@ -25,7 +25,7 @@ class Roughness(Tool):
     name, label = "roughness", "Roughness"
     help = "Measure the signed height of points above the smoothed surface"
     settings = (WAVELENGTH,)
-    panel, menu = Row("Measure", 1, 2), Row("Object", 3, 2)
+    panel, menu = Row("Measure", 3, 2), Row("Object", 3, 2)
 
     def inputs(self, cloud: Cloud, own: Any) -> Any:
         check_wavelength(own.wavelength, cloud.points, cloud.name)

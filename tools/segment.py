@@ -26,7 +26,7 @@ class Segment(Tool):
         Setting("parts", "How many parts", 6, 1, high=50),
         Setting("mode", "Number of the mode; 1 is the constant one", 2, 1, high=100),
     )
-    panel, menu, quick = Row("Segment", 1, 1), Row("Object", 5, 1), Row("Object", 1, 2, "Segment")
+    panel, menu, quick = Row("Make", 2, 1), Row("Object", 5, 1), Row("Object", 1, 2, "Segment")
     extended = True
 
     def asks(self, own: Any) -> tuple[str, ...]:

@@ -26,7 +26,7 @@ class Signature(Tool):
         Setting("count", "How many scales, from fine to coarse", 8, 1, 999, label="Scales", high=50),
         Setting("modes", "How many vibration modes they are made of", 100, 10, high=300),
     )
-    panel, menu = Row("Measure", 4, 1), Row("Object", 5, 3)
+    panel, menu = Row("Advanced", 3, 1), Row("Object", 5, 3)
 
     def later(self, own: Any) -> tuple[str, ...]:
         return "kind", "count"

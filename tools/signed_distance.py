@@ -16,7 +16,7 @@ class SignedDistance(Tool):
     name, label = "signed_distance", "Signed Distance"
     help = "Geodesic distance from a curve, positive on its left"
     reads = ("curve",)
-    panel, menu = Row("Measure", 2, 2), Row("Object", 7, 1)
+    panel, menu = Row("Advanced", 2, 2), Row("Object", 7, 1)
 
     def inputs(self, cloud: Cloud, own: Any) -> Any:
         return cloud.curve()

@@ -82,7 +82,7 @@ class Simulate(Tool):
         ),
     )
     reads = ("sources",)
-    panel, menu = Row("Simulate", 1, 1), Row("Object", 6, 3)
+    panel, menu = Row("Move", 1, 1), Row("Object", 6, 3)
     extended = True
 
     def inputs(self, cloud: Cloud, own: Any) -> Array:

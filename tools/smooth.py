@@ -60,7 +60,7 @@ class Smooth(MovingTool):
         ),
         Setting("keep_boundary", "Leave the boundary where it is", True),
     )
-    panel, menu, quick = Row("Clean", 2, 1), Row("Object", 4, 1), Row("Object", 1, 1, "Clean")
+    panel, menu = Row("Clean", 2, 1), Row("Object", 4, 1)
     keeps_line = True
 
     def asks(self, own: Any) -> tuple[str, ...]:

@@ -56,6 +56,7 @@ class StrayPoints(PointTool):
         *SIZES,
     )
     panel, menu = Row("Clean", 1, 1), Row("Object", 4, 3)
+    quick = Row("Object", 1, 1, "Clean", (("action", "DELETE"),))
     keeps_line = deletes = extended = True
     bytes_a_point = 3000
 

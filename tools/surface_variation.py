@@ -14,7 +14,7 @@ class SurfaceVariation(Tool):
 
     name, label = "surface_variation", "Surface Variation"
     help = "Measure how far the neighborhood of each point is from a plane: edges, corners and noise are large"
-    panel, menu = Row("Measure", 1, 3), Row("Object", 3, 4)
+    panel, menu = Row("Advanced", 3, 2), Row("Object", 3, 4)
 
     def compute(self, laplacian: Laplacian, inputs: Any, own: Any, progress: Progress) -> Any:
         return core.measure.surface_variation(laplacian)

@@ -32,6 +32,7 @@ class Row(NamedTuple):
     group: int
     place: int
     text: str = ""  # of the button, if not the label of the tool
+    given: tuple[tuple[str, str], ...] = ()  # settings of the button by name, if not the defaults
 
 
 class Cloud(Protocol):

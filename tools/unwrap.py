@@ -34,7 +34,7 @@ class Unwrap(Tool):
         Setting("angle", "Rotation of the texture about its center", 0.0, form="DEGREES"),
     )
     reads = ("sources",)
-    panel, menu = Row("Measure", 3, 2), Row("Object", 7, 3)
+    panel, menu = Row("Make", 2, 3), Row("Object", 7, 3)
 
     def later(self, own: Any) -> tuple[str, ...]:
         return "radius", "angle"

@@ -5,7 +5,8 @@ from bpy.props import BoolProperty, FloatProperty, StringProperty
 
 from ..operators.objects.all_or_nothing import all_or_nothing
 from ..operators.objects.color_choices import COLOR_CHOICES, color_choice
-from ..operators.objects.colors import own_material
+from ..operators.objects.colors import own_material, replaced_material
+from ..operators.objects.notices import withdraw
 from ..operators.registration import Registration, Row
 from ..operators.running.ready import ReadyOperator, reporting
 from ..tools.quantities import quantity
@@ -84,6 +85,7 @@ class MESHFREE_OT_own_material(ReadyOperator, bpy.types.Operator):
     def execute(self, context):
         with all_or_nothing([context.object]):
             show_own_material(context.object)
+            withdraw(context.object, replaced_material(context.object))
             use_material_preview(context)
         return {"FINISHED"}
 

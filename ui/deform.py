@@ -13,7 +13,9 @@ from ..operators.deform.pose import State
 from ..operators.objects.groups import handle_names
 from ..operators.objects.modifiers import input_property
 from ..operators.objects.reading import obstacle
+from ..tools.groups import ANCHOR, HANDLE
 from .dialogs import search_group
+from .groups import draw_groups
 from .panel import SidebarPanel
 from .wrapping import draw_text, split_properties
 
@@ -22,8 +24,7 @@ class MESHFREE_PT_deform(SidebarPanel, bpy.types.Panel):
     """Deformation by handles"""
 
     bl_label = "Bend"
-    bl_parent_id = "MESHFREE_PT_main"
-    bl_options = {"DEFAULT_CLOSED"}
+    bl_parent_id = "MESHFREE_PT_move"
 
     @classmethod
     def poll(cls, context):
@@ -38,13 +39,15 @@ class MESHFREE_PT_deform(SidebarPanel, bpy.types.Panel):
             draw_text(layout, context, f"Follows {kind_of(obj).followed}: see Rig", "INFO")
             return
         split_properties(layout, context)
-        column = layout.column(align=True)
-        search_group(column, settings, "handles", obj)
-        search_group(column, settings, "anchors", obj)
+        for name, role in (("handles", HANDLE), ("anchors", ANCHOR)):
+            column = layout.column(align=True)
+            search_group(column, settings, name, obj, told=False)
+            if obj == context.object:  # whose points are selected
+                draw_groups(column, obj, role)
         names = handle_names(obj)
         if len(names) > 1:
-            draw_text(column, context, f"{len(names)} groups of handles", "INFO")
-        if obj == context.object:  # whose points are selected
+            draw_text(layout, context, f"{len(names)} groups of handles", "INFO")
+        if obj == context.object:
             layout.operator("meshfree.handle_add")
         column = layout.column(align=True)
         column.prop(settings, "add_empties")

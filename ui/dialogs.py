@@ -16,6 +16,7 @@ from ..tools.groups import FIXED, HIGH, LOW, ROLES, SOURCE, VALUE
 from .wrapping import draw_text
 
 _OPTIONAL = LOW, HIGH, VALUE  # not all of them are needed
+_NO_SOURCE = "Select a point in Edit Mode first"
 
 
 def draw_setting(layout, settings, name: str, obj):
@@ -34,16 +35,16 @@ def draw_setting(layout, settings, name: str, obj):
         layout.prop(settings, name)
 
 
-def search_group(layout, settings, name: str, obj):
+def search_group(layout, settings, name: str, obj, told: bool = True):
     """Draw a setting that names a group of an object, in red if that is missing, unless it has the default name.
 
-    Then a text says what is used instead.
+    Then a text says what is used instead, or what to do first, if that is to be told.
     """
     group = getattr(settings, name)
     owner, groups = (obj, "vertex_groups") if obj.type == "MESH" else (obj.data, "attributes")
     awaited = group in ROLES and not has_group(obj, group)
     layout.prop_search(settings, name, owner, groups, results_are_suggestions=awaited)
-    if awaited and group not in _OPTIONAL:
+    if told and awaited and group not in _OPTIONAL:
         draw_text(layout, bpy.context, _instead(obj, group), "INFO")
 
 
@@ -53,8 +54,14 @@ def _instead(obj, group):
         return "Uses the detected boundaries" if group == FIXED else "No points assigned yet"
     count = int(selection(obj).sum())
     if count == 0:
-        return "Select a point in Edit Mode first"
+        return _NO_SOURCE
     return "Uses the selected point" if count == 1 else f"Uses the {count:,} selected points"
+
+
+def _lacks(operator, obj) -> bool:
+    """Whether a dialog cannot be confirmed yet: there are no sources."""
+    asked = "group" in operator.asks and operator.group == SOURCE and not has_group(obj, SOURCE)
+    return asked and _instead(obj, SOURCE) == _NO_SOURCE
 
 
 def _draw_asked(operator, context):
@@ -62,7 +69,10 @@ def _draw_asked(operator, context):
 
 
 def _draw_tool(operator, context):
-    _draw(operator, context, operator.adjustable if operator.is_repeated(context) else operator.asks)
+    repeated = operator.is_repeated(context)
+    _draw(operator, context, operator.adjustable if repeated else operator.asks)
+    if not repeated and _lacks(operator, context.object):
+        operator.layout.template_popup_confirm("", text="", cancel_text="Close")  # without OK
 
 
 def _draw_apply(operator, context):

@@ -78,7 +78,7 @@ def _shown(obj):
     if bounds is None or step_colors(obj):
         raise core.PointCloudError(
             f'"{obj.name}" shows no numbers that change along the surface. Show such an attribute, or one component of'
-            " a vector, under Display first."
+            " a vector, under Show first."
         )
     values = read_attribute(obj.data, name)
     (shown,) = sloping(

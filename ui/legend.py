@@ -119,7 +119,7 @@ class MESHFREE_OT_legend(ReadyOperator, bpy.types.Operator):
             raise PointCloudError("The scene has no camera to put a legend in front of. Add one with Add > Camera.")
         if shown_scale(obj, scene) is None:
             what = "its own colors, which are not values" if shown_attribute(obj) else "no colors yet"
-            raise PointCloudError(f'"{obj.name}" shows {what}. Choose what to see under Display first.')
+            raise PointCloudError(f'"{obj.name}" shows {what}. Choose what to see under Show first.')
         make_legend(scene, obj, scene.camera, self.title)
         return {"FINISHED"}
 

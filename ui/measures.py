@@ -97,8 +97,6 @@ def draw_measures(layout, context):
     rows = kept_rows(obj)[:_SHOWN]
     if not rows:
         return
-    if are_outdated(obj):
-        draw_text(layout, context, "Measures are stale: measure the parts again", "ERROR")
     found = columns(obj, context.scene.unit_settings)
     for number, row in enumerate(rows):
         column = layout.column(align=True)
@@ -110,6 +108,8 @@ def draw_measures(layout, context):
     left = len(obj.meshfree.parts) - len(rows)
     if left:
         draw_text(layout, context, f"and {left:,} more, which Copy and Export hold, too")
+    if are_outdated(obj):
+        draw_text(layout, context, "Measures are stale: measure the parts again", "ERROR")
     row = layout.row(align=True)
     row.operator("meshfree.copy_measures", text="Copy")
     row.operator("meshfree.export_measures", text="Export CSV...")

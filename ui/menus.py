@@ -65,7 +65,7 @@ def _draw_object_quick(menu, context):
         return
     layout.separator()
     if obj.type != "MESH" or not obj.data.polygons:
-        layout.operator("meshfree.analyze").modes = obj.meshfree.modes
+        layout.operator("meshfree.analyze")
         draw_tasks(layout)
     layout.menu(MESHFREE_MT_object.__name__)
 

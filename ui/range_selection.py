@@ -42,7 +42,7 @@ class MESHFREE_OT_select_by_range(SelectionOperator, bpy.types.Operator):
         if bounds is None:
             raise PointCloudError(
                 f'"{obj.name}" shows no numbers as colors. Show an attribute, or one component of a vector,'
-                " under Display first."
+                " under Show first."
             )
         for name, bound in zip(("low", "high"), bounds, strict=True):
             if not self.properties.is_property_set(name):

@@ -5,6 +5,7 @@ import bpy
 from ..operators.objects.reading import obstacle
 from ..operators.rigging.bones import chosen_armature
 from .follow import draw_follow
+from .notices import draw_figures
 from .panel import SidebarPanel, draw_tools
 from .wrapping import draw_text
 
@@ -13,8 +14,7 @@ class MESHFREE_PT_rig(SidebarPanel, bpy.types.Panel):
     """Weights of bones: points that follow an armature"""
 
     bl_label = "Rig"
-    bl_parent_id = "MESHFREE_PT_main"
-    bl_options = {"DEFAULT_CLOSED"}
+    bl_parent_id = "MESHFREE_PT_move"
 
     @classmethod
     def poll(cls, context):
@@ -27,6 +27,7 @@ class MESHFREE_PT_rig(SidebarPanel, bpy.types.Panel):
             draw_text(self.layout, context, f"Bones of {armature.name}", "OUTLINER_OB_ARMATURE")
         draw_tools(self.layout, self.bl_label)
         draw_follow(self.layout, context, context.object)
+        draw_figures(self.layout, context, self.bl_label)
 
 
 CLASSES = (MESHFREE_PT_rig,)

@@ -267,5 +267,5 @@ TOOLS = (
     Registration(MESHFREE_OT_export_operator),
     Registration(MESHFREE_OT_export_eigenvalues),
     Registration(MESHFREE_OT_export_measures),
-    Registration(MESHFREE_OT_export_profile, panel=Row("Points and Groups", 2, 4, "Export Profile...")),
+    Registration(MESHFREE_OT_export_profile, panel=Row("Measure", 1, 4, "Export Profile...")),
 )

@@ -54,4 +54,4 @@ class MESHFREE_OT_show_splats(SplatOperator, bpy.types.Operator):
         self.report({"INFO"}, f"{obj.name}: {len(splats):,} Gaussian splats")
 
 
-TOOLS = (Registration(MESHFREE_OT_show_splats, panel=Row("Splats", 1, 1), menu=Row("Object", 1, 2)),)
+TOOLS = (Registration(MESHFREE_OT_show_splats, menu=Row("Object", 1, 2)),)

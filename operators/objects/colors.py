@@ -37,6 +37,12 @@ def own_material(obj):
     return None if material is None or DISPLAY_TAG in material else material
 
 
+def replaced_material(obj) -> str:
+    """Return the notice that the display replaces an object's material, which goes when that is shown again."""
+    name = own_material(obj).name
+    return f'{obj.name}: the display replaces the material "{name}". Own Material, in the list of Show, brings it back.'
+
+
 def shows_own_material(obj) -> bool:
     """Whether an object is shown in a material of the user's, without a display or by it."""
     display, material = next(filter(is_display, obj.modifiers), None), own_material(obj)

@@ -10,7 +10,7 @@ from bpy.app.handlers import persistent
 
 from .handlers import add_handlers, remove_handlers
 from .motion import TEMPORARY, TOOL, close_frames
-from .notices import keep, remove
+from .notices import keep, withdraw
 
 FOLDER = "//motion"  # beside the file
 _known = {}  # files that were made or replaced since Blender started, in their order, as keys
@@ -165,7 +165,7 @@ def _on_save(path, *_):
     if Path(path).resolve() != Path(bpy.data.filepath).resolve():  # it is a copy, and this file goes on
         _take_back()
     for obj, _ in _before:
-        remove(obj, TEMPORARY)
+        withdraw(obj, TEMPORARY)
     _before.clear()
 
 

@@ -1,10 +1,20 @@
 """Notices of tools, kept on an object until they are dismissed or the tool runs again."""
 
+import re
+
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
 from ..registration import Registration, Row
 from .words import in_blender
+
+# What sentences begin with that say what to do. Those that begin otherwise, "If that is wrong", leave it to the user.
+_ORDERS = (
+    "Add|Analyze|Bind|Choose|Copy|Delete|Export|Give|Install|Leave|Lower|Make|Measure|Name|Open|Press|Project|Raise|Save|"
+    "Select|Set|Start|Switch|Thin|Train|Turn|Undo|Use|Wait"
+)
+_ORDER = re.compile(rf"(?:^|[.:] )(?:{_ORDERS})\b")
+IMPORTS = ("Import Points", "Import Tiles")  # what these told is of the file, whatever becomes of the points
 
 
 class MESHFREE_PG_notice(bpy.types.PropertyGroup):
@@ -16,19 +26,25 @@ class MESHFREE_PG_notice(bpy.types.PropertyGroup):
         name="Level",
         description="Importance of the notice",
         items=(
-            ("WARNING", "Warning", "Something was guessed, left out or replaced"),
+            ("WARNING", "Warning", "There is something to do"),
             ("INFO", "Info", "Figures to be read again"),
+            ("NOTICE", "Notice", "Something was guessed, left out or replaced, and there is nothing to do"),
         ),
-        default="WARNING",
+        default="NOTICE",
     )
 
 
-def keep(obj, tool: str, text: str, level: str = "WARNING"):
-    """Keep a notice of a tool on an object, in place of the same one of another tool."""
+def level_of(text: str) -> str:
+    """Return the level of a notice: a warning where a sentence of it says what to do."""
+    return "WARNING" if _ORDER.search(text) else "NOTICE"
+
+
+def keep(obj, tool: str, text: str, level: str = ""):
+    """Keep a notice of a tool on an object, in place of the same one of another tool; its level is that of the text."""
     notices, text = obj.meshfree.notices, in_blender(text)
     _remove(notices, lambda kept: kept.text == text)
     kept = notices.add()
-    kept.tool, kept.text, kept.level = tool, text, level
+    kept.tool, kept.text, kept.level = tool, text, level or level_of(text)
 
 
 def forget(obj, tool: str):
@@ -36,9 +52,14 @@ def forget(obj, tool: str):
     _remove(obj.meshfree.notices, lambda kept: kept.tool == tool)
 
 
-def remove(obj, text: str):
-    """Remove the notices of one text from an object: what it asks for is done."""
+def withdraw(obj, text: str):
+    """Remove a notice from an object, since what it asks for is done."""
     _remove(obj.meshfree.notices, lambda kept: kept.text == in_blender(text))
+
+
+def forget_results(obj):
+    """Remove what tools told of points that have changed since, which their results are not of any more."""
+    _remove(obj.meshfree.notices, lambda kept: kept.tool not in IMPORTS)
 
 
 def renew(obj, tool: str, texts):

@@ -53,10 +53,7 @@ def obstacle(obj, modes=("OBJECT",)) -> str:
     kind = "vertices" if obj.type == "MESH" else "points"
     lost = obj.meshfree.point_count and not point_count(obj.data)
     if lost or CORNER in obj.data.attributes:
-        return (
-            f'"{obj.name}" has lost its {kind}. Undo, and instead of Object > Convert use Convert under'
-            " Points and Groups"
-        )
+        return f'"{obj.name}" has lost its {kind}. Undo, and instead of Object > Convert use Convert under Make'
     if any(map(is_sequence, obj.modifiers)):
         return (
             f'"{obj.name}" shows the objects of a collection, one at each frame. Turn on the check box of that'

@@ -20,7 +20,6 @@ from .options import point_budget, settings_values
 from .reading import chosen_sides, fingerprint, metric, sharing_objects
 
 _DIGITS = 3  # that scans justify
-_LEAST = 1e-3  # share of an area in doubt that is told
 
 
 def check_writable(obj, names, make_single_user: bool, among=()):
@@ -133,9 +132,10 @@ def note_stages(obj, times):
         stage.name, stage.seconds = name, seconds
 
 
-def is_trusted(result) -> bool:
-    """Whether nothing of the area of a result, or of the settings of an object with one, is in doubt."""
-    return result.trusted_area >= (1.0 - _LEAST) * result.total_area
+def trusted_text(result) -> str:
+    """Write the area that can be trusted of a result, or of the settings of an object; empty where it reads as all."""
+    text = area_text(result.trusted_area)
+    return "" if text == area_text(result.total_area) else text
 
 
 def read_eigenvalues(obj):

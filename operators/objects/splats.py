@@ -54,7 +54,7 @@ def column_names(data) -> list:
 
 
 def holds_columns(data) -> bool:
-    """Whether attributes of loose points are the columns of a file of splats, as Blender's importer of PLY leaves them."""
+    """Whether attributes of loose points are the columns of a file of splats, as Blender's PLY importer leaves them."""
     if _FIRST not in data.attributes or has_splats(data) or getattr(data, "polygons", ()):
         return False
     return core.splats.hold_enough((*"xyz", *column_names(data)))

@@ -2,11 +2,11 @@
 
 _WORDS = {  # in texts of core, and in Blender
     "a greater bandwidth_factor": "a greater Bandwidth Factor",
-    "LaplaceBeltrami.doubt tells": "The attribute lb_doubt shows",
+    "LaplaceBeltrami.doubt tells": "Doubt, in the list of Show, tells",
     "by columns": "in Columns at the import",
     "Give columns only": "Give Columns only",
     "LasChoices.meters converts": "Convert to Meters converts",
-    "; in meters one is": ". Blender shows meters: use that, or set Unit Scale in the properties of the scene to",
+    "; in meters one is": ". Set Unit Scale in the properties of the scene, which shows meters, to",
     "LasChoices.withheld keeps": "Withheld Points keeps",
     "write_splats writes": "Export Splats writes",
     "There are no points. Add points.": "There are no points. Add points, or choose another object.",

@@ -182,7 +182,7 @@ class MESHFREE_OT_transfer_attributes(TransferAttributes, TransferOperator, bpy.
 TOOLS = (
     Registration(
         MESHFREE_OT_transfer_attributes,
-        panel=Row("Measure", 5, 3),
+        panel=Row("Two Scans", 1, 3),
         menu=Row("Object", 2, 6),
     ),
 )

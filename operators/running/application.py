@@ -7,7 +7,7 @@ from ...command.naming import naming
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import DISC
 from ..objects.carried import write_discs
-from ..objects.colors import own_material, shows_own_material
+from ..objects.colors import replaced_material, shows_own_material
 from ..objects.handlers import notify
 from ..objects.options import laplacian_options
 from ..objects.reading import TYPES, discs, obstacle, read_points, sharing_objects
@@ -135,11 +135,7 @@ class ShownOperator(ApplicationOperator):
             for obj in objects:
                 _write_discs(context, obj)
             for obj in filter(shows_own_material, [*objects, *sharing]):
-                self.warn(
-                    f'{obj.name}: the display replaces the material "{own_material(obj).name}". Own Material under'
-                    " Display shows it again.",
-                    obj,
-                )
+                self.warn(replaced_material(obj), obj)
             for obj in [*objects, *sharing]:
                 notify("result_written", obj, self.shown if self.shown in obj.data.attributes else "")
 

@@ -2,6 +2,7 @@
 
 from concurrent.futures import Future
 from threading import Event, Thread
+from time import perf_counter
 
 import bpy
 from bpy.app.handlers import persistent
@@ -20,6 +21,7 @@ STOPPED = "Stopped: nothing was changed"  # by the user
 _FIRST = 0.01  # seconds to the first timer event, after the first redraw
 _TICK = 0.1  # seconds between timer events
 _PATIENCE = 1.0  # seconds that Blender waits for the thread when it quits
+_FORESEEN = 2.0, 0.03  # seconds, and share of the work, after which the time left is told
 _jobs = []  # the one that runs
 
 
@@ -34,6 +36,16 @@ def busy() -> str:
     if job is None:
         return ""
     return f"{job.label} is running. Wait for it, or press Esc to stop it"
+
+
+def left_text(spent: float, fraction: float) -> str:
+    """Return how long a job will take that has taken some seconds for a share of its work; empty at its begin."""
+    if spent < _FORESEEN[0] or fraction < _FORESEEN[1]:
+        return ""
+    seconds = spent * (1.0 - fraction) / fraction
+    if seconds < 10.0:
+        return "some seconds left"
+    return f"{round(seconds, -1):.0f} s left" if seconds < 95.0 else f"{seconds / 60.0:.0f} min left"
 
 
 class Snapshot:
@@ -97,7 +109,7 @@ class Job(StageTimes):
         super().__init__()
         self.label, self.snapshots = label, snapshots
         self.stage, self.reason, self._stop = "Start", "", Event()
-        self._timer, self._shown, self._begun = None, "", at_once
+        self._timer, self._shown, self._begun, self._since = None, "", at_once, perf_counter()
         self._future = Future()
         self._prepare(compute, at_once)
 
@@ -111,6 +123,12 @@ class Job(StageTimes):
         if self._stop.is_set():
             raise Cancelled
         super().__call__(stage, fraction)
+
+    @property
+    def progress(self):
+        """How much is done, and how long the rest will take, as a text."""
+        left = left_text(perf_counter() - self._since, self.fraction)
+        return f"{self.fraction:.0%}{', ' if left else ''}{left}"
 
     def _run(self, compute):
         try:
@@ -152,7 +170,7 @@ class Job(StageTimes):
     def show(self, context):
         """Show the progress in the status bars of all windows."""
         windows = context.window_manager.windows
-        text = f"{self.label}: {self.stage}, {self.fraction:.0%}    Esc to stop"
+        text = f"{self.label}: {self.stage}, {self.progress}    Esc to stop"
         if text != self._shown:
             self._shown = text
             _set_status([window.workspace for window in windows], text)

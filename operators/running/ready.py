@@ -5,7 +5,7 @@ from functools import wraps
 from numpy.linalg import LinAlgError
 
 from ...core import PointCloudError
-from ..objects.notices import forget, keep
+from ..objects.notices import forget, keep, level_of
 from ..objects.reading import obstacle, sharing_objects
 from ..objects.words import in_blender
 
@@ -38,21 +38,21 @@ def reporting(method):
 
 
 class NoticeOperator:
-    """An operator whose warnings are kept on the object that they concern, where the panel shows them.
+    """An operator whose notices are kept on the object that they concern, where the panel shows them.
 
     A report in the status bar disappears with the next one.
     """
 
     def warn(self, text: str, *objects):
-        """Report a warning about objects, and keep it on them."""
-        self._keep("WARNING", text, objects)
+        """Report a notice about objects, a warning if it says what to do, and keep it on them."""
+        self._keep(level_of(in_blender(text)), text, objects)
 
     def note(self, text: str, *objects):
         """Report figures about objects, and keep them on them."""
         self._keep("INFO", text, objects)
 
     def _keep(self, level, text, objects):
-        self.report({level}, in_blender(text))
+        self.report({"INFO" if level == "NOTICE" else level}, in_blender(text))
         for owner in _owners(objects):
             keep(owner, self.bl_label, text, level)
 

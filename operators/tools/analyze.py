@@ -4,17 +4,18 @@ from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
-from bpy.props import BoolProperty, IntProperty
+from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from ... import core
 from ...command import analysis
 from ...command.analysis import WRITE_LIMIT, Built
 from ...command.stages import StageTimes
-from ...tools.quantities import NORMAL
+from ...tools.quantities import MEAN_CURVATURE, NORMAL, quantity
 from ..objects.attributes import point_count
+from ..objects.notices import forget_results
 from ..objects.options import laplacian_options, point_budget
 from ..objects.reading import read_points
-from ..objects.result import analysis_names, area_text, is_trusted, write_result
+from ..objects.result import analysis_names, area_text, is_analyzed, is_stale, trusted_text, write_result
 from ..registration import Registration, Row
 from ..running.application import ShownOperator
 from ..running.measures import measure
@@ -116,10 +117,13 @@ class AnalysisOperator(ShownOperator):
         return plan_analysis(context, obj, self.wanted, self.write_limit)
 
     def write(self, context, obj, result):
+        if is_analyzed(obj) and is_stale(obj):
+            forget_results(obj)
         write_result(obj, result, self.write_limit)
         modes = "" if result.spectrum is None else f", {len(result.spectrum.eigenvalues)} modes"
         points, seconds = point_count(obj.data), sum(result.seconds.values())
-        trusted = "" if is_trusted(result) else f" ({area_text(result.trusted_area)} of it trusted)"
+        trusted = trusted_text(result)
+        trusted = f" ({trusted} of it trusted)" if trusted else ""
         line = f"{obj.name}: {area_text(result.total_area)}{trusted} from {points:,} points{modes}, {seconds:.1f} s"
         return [*result.notices, line]
 
@@ -129,11 +133,30 @@ class MESHFREE_OT_analyze(AnalysisOperator, bpy.types.Operator):
 
     bl_idname = "meshfree.analyze"
     bl_label = "Analyze Points"
-    shown = ""  # the attribute on display
 
     modes: IntProperty(
-        name="Modes", description="Compute this many vibration modes in the same run", default=0, min=0, soft_max=100
+        name="Modes",
+        description="Compute this many vibration modes in the same run",
+        default=0,
+        min=0,
+        soft_max=100,
+        options={"SKIP_SAVE"},  # else the search (F3) would do what a script has done last
     )
+    attribute: StringProperty(
+        name="Attribute",
+        description="Name of the result to show; empty for the one on show, or the mean curvature",
+        options={"SKIP_SAVE"},
+    )
+
+    @classmethod
+    def description(cls, context, properties):
+        """Return the tooltip of a button; empty for that of the class."""
+        return quantity(properties.attribute).tooltip
+
+    @property
+    def shown(self):
+        """Name of the attribute."""
+        return self.attribute
 
     @property
     def wanted(self):
@@ -141,4 +164,10 @@ class MESHFREE_OT_analyze(AnalysisOperator, bpy.types.Operator):
         return self.modes
 
 
-TOOLS = (Registration(MESHFREE_OT_analyze, menu=Row("Object", 1, 3)),)
+TOOLS = (
+    Registration(
+        MESHFREE_OT_analyze,
+        menu=Row("Object", 1, 3),
+        quick=Row("Object", 1, 3, "Curvature", (("attribute", MEAN_CURVATURE),)),
+    ),
+)

@@ -69,12 +69,15 @@ class StrayActions(StraySettings):
     @classmethod
     def description(cls, context, properties):
         """Return the tooltip of a button; empty for that of the class."""
+        if not properties.as_shown:
+            delete = properties.action == "DELETE"
+            return "Delete stray points: single ones off the surface, and small floating parts" if delete else ""
         return {
             "SELECT": "Select the stray points that are shown",
             "HIDE": "Hide the stray points that are shown, in Edit Mode",
             "SEPARATE": "Move the stray points that are shown to an object of their own",
             "DELETE": "Delete the stray points that are shown",
-        }.get(properties.action if properties.as_shown else "", "")
+        }.get(properties.action, "")
 
     @property
     def adjustable(self):

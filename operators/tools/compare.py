@@ -68,7 +68,7 @@ class Swapped(CompareObjects):
     @classmethod
     def obstacle(cls, context):
         if cls.subject(context) is None:
-            return "The active object was not compared yet. Press Compare Points under Measure"
+            return "The active object was not compared yet. Press Compare Points under Two Scans"
         return super().obstacle(context)
 
     def conclude(self, context, objects):

@@ -224,6 +224,6 @@ class MESHFREE_OT_geodesic_path(SelectionOperator, bpy.types.Operator):
 
 
 TOOLS = (
-    Registration(MESHFREE_OT_measure_selection, panel=Row("Points and Groups", 2, 1), menu=Row("Points", 2, 1)),
-    Registration(MESHFREE_OT_geodesic_path, panel=Row("Points and Groups", 2, 2), menu=Row("Points", 2, 2)),
+    Registration(MESHFREE_OT_measure_selection, panel=Row("Measure", 1, 1), menu=Row("Points", 2, 1)),
+    Registration(MESHFREE_OT_geodesic_path, panel=Row("Measure", 1, 2), menu=Row("Points", 2, 2)),
 )

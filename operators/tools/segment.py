@@ -121,5 +121,5 @@ class MESHFREE_OT_separate_by_segment(ApplicationOperator, bpy.types.Operator):
 
 TOOLS = (
     registration_of(segment.TOOL, SegmentGroups),
-    Registration(MESHFREE_OT_separate_by_segment, panel=Row("Segment", 1, 2), menu=Row("Object", 5, 2)),
+    Registration(MESHFREE_OT_separate_by_segment, panel=Row("Make", 2, 2), menu=Row("Object", 5, 2)),
 )

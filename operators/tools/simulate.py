@@ -208,7 +208,7 @@ class Kept:
         removed = motion_files.shrink_former(self.budget * _MEGABYTE - own)
         if removed:
             self.warn(
-                f"Undo does not bring back {'a former motion' if removed == 1 else f'{removed} former motions'}: those"
+                f"{'A former motion' if removed == 1 else f'{removed} former motions'} cannot come back by Undo: those"
                 f" frames did not fit into the Disk Budget of {self.budget} MB beside the new ones.",
                 objects[0],
             )

@@ -55,7 +55,7 @@ class TestRightClick:
     def test_on_a_cloud(self):
         add_object(sphere_points())
         menu = right_click("VIEW3D_MT_object_context_menu")
-        most = {"analyze", "smooth", "segment", "principal_curvatures", "deform_bind"}
+        most = {"analyze", "stray_points", "segment", "deform_bind"}
         assert menu.operators == {f"meshfree.{name}" for name in most}
         assert menu.menus == ["MESHFREE_MT_object"]
 

@@ -99,7 +99,7 @@ def test_former_frames_beyond_the_budget_end_the_oldest_first(cloud, tmp_path, m
     assert not first.exists()
     assert saved.exists()
     assert len(there(tmp_path / "motion")) == 3
-    assert any("Undo does not bring back" in notice.text for notice in cloud.meshfree.notices)
+    assert any("cannot come back by Undo" in notice.text for notice in cloud.meshfree.notices)
 
 
 @pytest.mark.any_blender

@@ -39,11 +39,69 @@ def test_no_operator_warns_without_keeping_it():
 def test_a_warning_is_kept_and_drawn_until_it_is_dismissed():
     obj = sphere_with_a_face()
     bpy.ops.meshfree.analyze()
-    assert ("Analyze Points", "WARNING", FACES) in kept(obj)
+    assert ("Analyze Points", "NOTICE", FACES) in kept(obj)
     assert f"Analyze Points: {FACES}" in draw()
     bpy.ops.meshfree.dismiss(index=texts(obj).index(FACES))
     assert FACES not in texts(obj)
     assert f"Analyze Points: {FACES}" not in draw()
+
+
+@pytest.mark.parametrize(
+    ("text", "level"),
+    [
+        ("Points that lie on another one: 12. They share one area.", "NOTICE"),
+        ("Noise of 0.12 of the spacing, at 30% of the points. Results are of a smoothed surface.", "NOTICE"),
+        ("a.txt: not all columns have names. Read column_1 as x. If that is wrong, give their names.", "NOTICE"),
+        ("Floaters left out: 12. They move with the nearest splats, and Select Floaters selects them.", "NOTICE"),
+        ("Analyzed 100 of 1,000 points. The setting Point Budget decides how many.", "NOTICE"),
+        ("The rotations had not converged. Raise Steps.", "WARNING"),
+        ("a.ply: x and y are degrees of longitude and latitude. Project the points to meters first.", "WARNING"),
+        ('Smooth Points wrote nothing: "Cloud" was changed meanwhile. Start it again', "WARNING"),
+    ],
+)
+def test_only_what_says_what_to_do_is_a_warning(text, level):
+    obj, icons = add_object(sphere_points()), {}
+    notices = part("operators.objects.notices")
+    notices.keep(obj, "Tool", text)
+    assert kept(obj) == [("Tool", level, text)]
+    draw(icons=icons)
+    assert icons["1 Notice"] == ("ERROR" if level == "WARNING" else "INFO")
+
+
+def test_figures_stand_below_the_tools_and_are_no_notices():
+    obj = add_object(np.vstack([sphere_points(), [[0.0, 0.0, 3.0]]]))
+    bpy.ops.meshfree.stray_points()
+    assert kept(obj) == [("Stray Points", "INFO", "Cloud: 1 of 1,001 points are stray (0.10%)")]
+    assert "No Notices" in draw()
+    texts = draw(["clean"])
+    figure = texts.index("Stray Points: 1 of 1,001 points are stray (0.10%)")
+    assert figure > max(texts.index(tool) for tool in ("Thin Out...", "Smooth Points...", "Separate"))
+    assert not any("0.10%" in text for text in draw(["main", "measure"]))
+
+
+def test_a_new_analysis_of_changed_points_takes_back_what_was_told_of_them():
+    obj = sphere_with_a_face()
+    notices = part("operators.objects.notices")
+    notices.keep(obj, "Import Points", "is shifted")
+    bpy.ops.meshfree.analyze()
+    bpy.ops.meshfree.spectrum(count=4)  # which tells of the faces last
+    bpy.ops.meshfree.analyze()
+    notices.keep(obj, "Smooth Points", "The rotations had not converged. Raise Steps.")
+    bpy.ops.meshfree.analyze()
+    assert len(texts(obj)) == 3  # of the same points
+    obj.data.clear_geometry()
+    obj.data.from_pydata((1.1 * sphere_points()).tolist(), [], [])
+    bpy.ops.meshfree.analyze()
+    assert texts(obj) == ["is shifted"]
+
+
+def test_the_notice_of_a_material_goes_with_the_display_that_replaced_it():
+    obj = sphere_with_a_face()
+    obj.data.materials.append(bpy.data.materials.new("Mine"))
+    bpy.ops.meshfree.analyze()
+    assert [text for text in texts(obj) if '"Mine"' in text]
+    bpy.ops.meshfree.own_material()
+    assert not [text for text in texts(obj) if '"Mine"' in text]
 
 
 def test_all_are_dismissed_at_once():
@@ -75,7 +133,7 @@ def test_another_tool_leaves_notices_and_says_nothing_twice():
     obj = sphere_with_a_face()
     bpy.ops.meshfree.analyze()
     bpy.ops.meshfree.spectrum(count=4)
-    assert kept(obj).count(("Compute Modes", "WARNING", FACES)) == 1
+    assert kept(obj).count(("Compute Modes", "NOTICE", FACES)) == 1
     assert texts(obj).count(FACES) == 1
     bpy.ops.meshfree.roughness()
     assert FACES in texts(obj)
@@ -95,9 +153,10 @@ def test_what_is_told_while_colors_are_put_on_show_is_kept_too():
 def test_many_notices_are_not_all_drawn_at_once():
     obj = add_object(sphere_points())
     for number in range(40):
-        obj.meshfree.notices.add().text = f"Notice {number}"
-    drawn = [text for text in draw() if "Notice" in text]
-    assert len(drawn) == 6
+        obj.meshfree.notices.add().text = f"The {number}th"
+    drawn = draw()
+    assert "40 Notices" in drawn
+    assert len([text for text in drawn if re.fullmatch(r": The \d+th", text)]) == 6
     assert "and 34 more, seen when these are dismissed" in draw()
 
 
@@ -225,7 +284,7 @@ def test_texts_are_wrapped_by_the_width_of_the_region():
     for width in (180, 260, 600):
         drawn = []
         bpy.types.MESHFREE_PT_main.draw(SimpleNamespace(layout=Layout(drawn)), Narrow(width))
-        lines[width] = drawn[: drawn.index("")]  # the cross of the notice has no text
+        lines[width] = drawn[drawn.index("1 Notice") + 1 : drawn.index("")]  # the cross of the notice has no text
         blf.size(0, 11.0)
         assert max(blf.dimensions(0, line)[0] for line in lines[width]) < width - 60
         assert " ".join(lines[width]).endswith(obj.meshfree.notices[0].text)

@@ -16,41 +16,61 @@ from tests.blender.operators import NOT_TOOLS, OPERATORS, tools
 from tests.blender.splats import add_splats, bar_splats
 
 OTHER_DIALOGS = {"deform_bake"}  # one that asks for more where its object has splats, which it finds out as it opens
-PANELS = (
+PANELS = (  # from top to bottom
     "main",
-    "settings",
-    "spectrum",
+    "select",
     "display",
-    "points",
-    "measure",
+    "splats",
     "clean",
-    "surface",
-    "segment",
-    "simulate",
+    "measure",
+    "two_scans",
+    "move",
     "deform",
     "rig",
-    "minimal",
+    "make",
+    "advanced",
+    "spectrum",
+    "settings",
+    "statistics",
 )
 TWINS = {"display_properties": "display", "settings_properties": "settings"}  # in the Properties editor
 
 
 class Layout:
-    """Stands in for Blender's layout: checks what it is asked to draw and remembers the texts."""
+    """Stands in for Blender's layout: checks what it is asked to draw; remembers texts, icons of labels, and buttons.
 
-    def __init__(self, texts=None):
+    Everything that unfolds is open, and the lists of results are drawn after their buttons.
+    """
+
+    use_property_split = False
+
+    def __init__(self, texts=None, icons=None, buttons=None):
         self.texts = [] if texts is None else texts
+        self.icons = {} if icons is None else icons
+        self.buttons = [] if buttons is None else buttons
 
     def row(self, **_):
-        return Layout(self.texts)
+        return Layout(self.texts, self.icons, self.buttons)
 
     column = box = grid_flow = split = row
+
+    def panel(self, idname, default_closed=False):
+        assert default_closed
+        return self.row(), self.row()
+
+    def separator(self):
+        pass
 
     def label(self, text="", icon="NONE"):
         assert icon in bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items
         self.texts.append(text)
+        self.icons[text] = icon
 
     def menu(self, idname, text=""):
-        self.texts.append(text or getattr(bpy.types, idname).bl_label)
+        menu = getattr(bpy.types, idname)
+        self.texts.append(text or menu.bl_label)
+        if idname in {"MESHFREE_MT_results", "MESHFREE_MT_modes"}:
+            menu.draw(SimpleNamespace(layout=self), bpy.context)
 
     def context_pointer_set(self, name, data):
         assert name == "object"
@@ -63,11 +83,17 @@ class Layout:
         search_data.path_resolve(search_property)
         self.prop(data, path)
 
-    def operator(self, idname, text=None, icon="NONE", icon_value=0, depress=False):
+    def operator(self, idname, text=None, icon="NONE", icon_value=0, depress=False, emboss=True):
         group, name = idname.split(".")
         kind = getattr(getattr(bpy.ops, group), name).get_rna_type()
         self.texts.append(text if text is not None else kind.name)
-        return SimpleNamespace(**dict.fromkeys(item.identifier for item in kind.properties))
+        settings = SimpleNamespace(**dict.fromkeys(item.identifier for item in kind.properties))
+        self.buttons.append((idname, settings))
+        return settings
+
+    def template_popup_confirm(self, idname, text, cancel_text):
+        assert idname == text == ""
+        self.texts.append(cancel_text)
 
     def progress(self, text, factor):
         assert 0.0 <= factor <= 1.0
@@ -92,13 +118,17 @@ def settings_of(operator, repeated=False, **values):
     return kind(**values)
 
 
-def draw():
-    """Texts of all panels for the active object."""
+def draw(names=PANELS, icons=None, buttons=None):
+    """Texts of panels for the active object; icons of labels and buttons go where it is given."""
     texts = []
-    for name in PANELS:
+    for name in names:
         panel = getattr(bpy.types, f"MESHFREE_PT_{name}")
         if not hasattr(panel, "poll") or panel.poll(bpy.context):
-            panel.draw(SimpleNamespace(layout=Layout(texts), bl_label=panel.bl_label), bpy.context)
+            more = {"draw_more": panel.draw_more} if hasattr(panel, "draw_more") else {}
+            stands_in = type(
+                "StandsIn", (), {"layout": Layout(texts, icons, buttons), "bl_label": panel.bl_label, **more}
+            )
+            panel.draw(stands_in(), bpy.context)
     return texts
 
 
@@ -111,10 +141,13 @@ def test_the_area_that_can_be_trusted_stands_beside_the_total(capfd):
     texts = draw()
     trusted = texts[texts.index("Trusted Area") + 1]
     assert f"{texts[texts.index('Total Area') + 1]} ({trusted} of it trusted) from" in capfd.readouterr().out
-    add_object(sphere_points(), "Sphere")
+    obj = add_object(sphere_points(), "Sphere")
     bpy.ops.meshfree.analyze()
-    assert "Total Area" in draw()
-    assert "Trusted Area" not in draw()
+    for share, told in ((1.0, False), (0.9999, False), (0.99, True)):  # told where it reads otherwise
+        obj.meshfree.trusted_area = share * obj.meshfree.total_area
+        texts = draw()
+        assert "Total Area" in texts
+        assert ("Trusted Area" in texts) == told
 
 
 def test_panel_without_object_says_what_to_do():
@@ -137,18 +170,14 @@ def test_panel_in_other_modes_says_what_to_do():
     bpy.ops.object.mode_set(mode="OBJECT")
 
 
-def test_panel_tells_calmly_of_groups_without_points():
-    obj = add_object(sphere_points())
+def test_panel_has_the_groups_of_a_bend_beside_their_settings():
+    add_object(sphere_points())
     texts = draw()
-    assert texts[texts.index("handles") : texts.index("anchors") + 2] == [
-        "handles",
-        "No points assigned yet",
-        "anchors",
-        "No points assigned yet",
+    assert texts[texts.index("handles") :][:8] == [
+        *("handles", "Assign to Handles", "0", ""),
+        *("anchors", "Assign to Anchors", "0", ""),
     ]
-    obj.vertex_groups.new(name="Anchor")
-    obj.meshfree.deform.handles = "Nowhere"
-    assert "No points assigned yet" not in draw()
+    assert "No points assigned yet" not in texts
 
 
 @pytest.mark.parametrize(
@@ -160,6 +189,7 @@ def test_dialogs_say_that_the_selection_is_used(name, count, text):
     obj = add_object(sphere_points())
     obj.data.vertices.foreach_set("select", np.arange(1000) < count)
     assert texts_of(name)[:2] == ["group", text]
+    assert (texts_of(name)[-1] == "Close") == (count == 0)  # in place of OK
     obj.vertex_groups.new(name="Source")
     assert texts_of(name)[:1] == ["group"]
     assert text not in texts_of(name)
@@ -174,13 +204,16 @@ def texts_of(name):
     return texts
 
 
-def test_panel_offers_what_tools_wrote_and_updates_only_what_is_on_show(modifiers):
+def test_panel_offers_what_tools_wrote(modifiers):
     obj = add_object(sphere_points())
     bpy.ops.meshfree.show_surface()
-    assert "Update Colors" not in draw()
+    assert not {"Shape Index", "Mean Curvature"} & set(draw())
+    assert "Choose a Result" in draw()
     bpy.ops.meshfree.principal_curvatures()
-    assert {"Shape Index", "Curvedness", "Curvature 1", "Direction 1", "Update Colors"} <= set(draw())
-    assert "Viewport Points" not in draw()
+    texts = draw()
+    assert {"Curvedness", "Curvature 1", "Direction 1"} <= set(texts)
+    assert texts.count("Shape Index") == 2  # in the list, and as what is chosen there
+    assert "Viewport Points" not in texts
     modifiers.set_input(obj.modifiers[0], "Viewport Points", 500)
     assert "Viewport Points" in draw()
 
@@ -247,7 +280,8 @@ def test_panel_follows_the_order_of_work():
     obj = add_object(sphere_points())
     bpy.ops.meshfree.spectrum(count=25)
     texts = draw()
-    order = [texts.index(text) for text in ("Analyze Points", "Total Area", "Compute Modes", "Eigenvalues", "Mode 2")]
+    steps = "Analyze Points", "No Notices", "Mode 2", "Compute Modes", "Eigenvalues", "Total Area"
+    order = [texts.index(text) for text in steps]
     assert order == sorted(order)
     area = next(text for text in texts if "m²" in text)
     assert float(area.split()[0]) == pytest.approx(4.0 * np.pi, rel=0.01)
@@ -274,23 +308,28 @@ def test_panel_marks_stale_results():
     obj = add_object(sphere_points())
     bpy.ops.meshfree.analyze()
     obj.data.vertices[0].co.x += 0.001
-    assert "Results are stale: analyze again" in draw()
+    icons = {}
+    assert "Results are stale: press Analyze Points again" in draw(icons=icons)
+    assert icons["1 Notice"] == "ERROR"
+    bpy.ops.meshfree.analyze()
+    assert "No Notices" in draw()
 
 
-def test_panel_names_scale_faces_modifiers_and_sharing():
+def test_panel_names_scale_modifiers_and_sharing():
     obj = add_object(sphere_points(), faces=[(0, 1, 2)])
     obj.scale = (1.0, 2.0, 1.0)
     obj.modifiers.new("Smooth", "SMOOTH")
     bpy.context.scene.collection.objects.link(obj.copy())
     bpy.context.view_layer.update()
-    texts = draw()
+    icons = {}
+    texts = " ".join(draw(icons=icons))
     for text in (
-        "Object scale (1, 2, 1) is applied to lengths and areas",
-        "Faces not used: 1",
-        "Modifiers left out: 1",
-        "Other objects share this mesh",
+        "are those in the scene, where the object is scaled by 1 x 2 x 1",
+        "Modifiers are left out: 1. Use Modifiers, under Settings",
+        "Other objects share its points. Make Single User, under Settings",
     ):
         assert text in texts
+    assert icons["3 Notices"] == "INFO"  # there is nothing to do
 
 
 def test_panel_tells_of_parts_boundaries_and_points_left_out_where_there_are_any():
@@ -346,6 +385,22 @@ def test_no_two_tools_have_the_same_row():
     assert len(set(places)) == len(places)
 
 
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+def test_no_button_stands_twice_in_the_tab(core, mode):
+    """But for results, which the list has beside arrows and eigenvalues."""
+    for obj in (add_object(sphere_points()), add_splats(bar_splats(core))):
+        bpy.context.view_layer.objects.active = obj
+        bpy.ops.meshfree.spectrum(count=3)
+        bpy.ops.meshfree.stray_points()
+        bpy.ops.object.mode_set(mode=mode)
+        buttons = []
+        draw(buttons=buttons)
+        bpy.ops.object.mode_set(mode="OBJECT")
+        keys = [(name, repr(settings)) for name, settings in buttons if name != "meshfree.colormap"]
+        assert len(keys) > (40 if mode == "OBJECT" else 20)
+        assert [key for key in set(keys) if keys.count(key) > 1] == []
+
+
 def test_panels_draw_every_tool_that_has_a_row(core):
     add_splats(bar_splats(core))
     texts, obj = set(draw()), add_object(sphere_points())
@@ -354,6 +409,9 @@ def test_panels_draw_every_tool_that_has_a_row(core):
     texts |= set(draw())
     bpy.ops.meshfree.deform_bake(first=1, last=2)
     texts |= set(draw())
+    bpy.ops.object.mode_set(mode="EDIT")
+    texts |= set(draw())
+    bpy.ops.object.mode_set(mode="OBJECT")
     rows = {name: tool.panel.text or tool.operator.bl_label for name, tool in tools().items() if tool.panel}
     assert len(rows) > 25
     assert [name for name, text in rows.items() if not {text, f"{text}..."} & texts] == []
@@ -422,11 +480,27 @@ def test_adjust_last_operation_offers_what_is_quick(name):
 
 def test_panel_while_something_runs(monkeypatch):
     add_object(sphere_points())
-    panel = part("ui.panel")
-    monkeypatch.setattr(panel, "running", lambda: SimpleNamespace(label="Smooth Points", stage="Filter", fraction=0.25))
+    notices = part("ui.notices")
+    job = SimpleNamespace(label="Smooth Points", fraction=0.25, progress="25%, 20 s left")
+    monkeypatch.setattr(notices, "running", lambda: job)
     texts = draw()
-    assert "Smooth Points (Esc to Stop)" in texts
-    assert "Filter: 25%" in texts
+    assert "Smooth Points: 25%, 20 s left" in texts
+    assert "No Notices" not in texts  # that line is where the progress is, so that nothing moves
+
+
+@pytest.mark.parametrize(
+    ("spent", "fraction", "text"),
+    [
+        (1.0, 0.5, ""),
+        (20.0, 0.01, ""),
+        (5.0, 0.5, "some seconds left"),
+        (5.0, 0.2, "20 s left"),
+        (60.0, 0.4, "90 s left"),
+        (60.0, 0.2, "4 min left"),
+    ],
+)
+def test_how_long_the_rest_takes(spent, fraction, text):
+    assert part("operators.running.job").left_text(spent, fraction) == text
 
 
 @pytest.mark.parametrize(("method", "kind"), [("DEFAULT", "LaplacianOptions"), ("PAPER", "PaperOptions")])

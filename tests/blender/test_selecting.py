@@ -156,8 +156,8 @@ def draw_points():
         def __getattr__(self, name):
             return lambda *_, **__: self
 
-    panel = SimpleNamespace(layout=Layout(), bl_label="Points and Groups")
-    bpy.types.MESHFREE_PT_points.draw(panel, bpy.context)
+    groups = part("ui.groups")
+    groups.draw_groups(Layout(), bpy.context.object, *groups.ROLES)
     return buttons
 
 

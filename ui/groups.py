@@ -1,14 +1,12 @@
-"""The panel for selecting points, and for the groups that the tools use."""
+"""Groups of points that tools use, drawn with these tools, and the panel for selecting points."""
 
 import bpy.utils.previews
 
 from ..operators.objects.counting import members
 from ..operators.objects.groups import has_group
 from ..operators.objects.reading import TYPES
-from ..operators.tools.convert import MESHFREE_OT_convert
 from ..tools.groups import ANCHOR, BOUNDARY_GROUP, FIXED, HANDLE, HIGH, LOW, ROLES, SOURCE, VALUE
 from . import colormaps
-from .measures import draw_selection
 from .panel import SidebarPanel, draw_tools
 
 _TITLES = {
@@ -25,30 +23,26 @@ _SIZE, _EDGE = 16, 2  # pixels of a swatch, the picture of a group's color, and 
 _swatches = []  # the collection of Blender that holds them
 
 
-class MESHFREE_PT_points(SidebarPanel, bpy.types.Panel):
-    """Selecting points, and the groups that the tools use"""
+class MESHFREE_PT_select(SidebarPanel, bpy.types.Panel):
+    """Selecting points, where Blender's own tools need faces"""
 
-    bl_label = "Points and Groups"
+    bl_label = "Select"
     bl_parent_id = "MESHFREE_PT_main"
-    bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
     def poll(cls, context):
-        return context.object is not None and context.object.type in TYPES
+        return context.object is not None and context.object.type in TYPES and context.object.mode == "EDIT"
 
     def draw(self, context):
-        layout, obj = self.layout, context.object
-        draw_tools(layout, self.bl_label)
-        _draw_clip(layout)
-        draw_selection(layout, context)
-        layout.prop(obj.meshfree, "show_groups")
-        column = layout.column(align=True)
-        for role, title in _TITLES.items():
-            _draw_group(column.split(factor=0.6, align=True), obj, role, title)
-        if bpy.app.version >= MESHFREE_OT_convert.since:
-            to_mesh = obj.type != "MESH"
-            text = "Convert to Mesh" if to_mesh else "Convert to Point Cloud"
-            layout.operator("meshfree.convert", text=text).target = "MESH" if to_mesh else "POINTCLOUD"
+        draw_tools(self.layout, self.bl_label)
+        _draw_clip(self.layout)
+
+
+def draw_groups(layout, obj, *roles):
+    """Draw the buttons that assign points to groups, select their points, and remove points from them."""
+    column = layout.column(align=True)
+    for role in roles:
+        _draw_group(column.split(factor=0.6, align=True), obj, role, _TITLES[role])
 
 
 def _draw_clip(layout):
@@ -59,7 +53,6 @@ def _draw_clip(layout):
 
 
 def _draw_group(row, obj, role, title):
-    """Draw the buttons that assign points to a group, show and select its points, and remove them."""
     icon = {"icon_value": _swatches[0][role].icon_id} if obj.meshfree.show_groups else {}
     assign = row.operator("meshfree.group_from_selection", text=f"Assign to {title}", **icon)
     assign.role, assign.action = role.upper(), "ADD"
@@ -95,4 +88,4 @@ def detach():
         bpy.utils.previews.remove(_swatches.pop())
 
 
-CLASSES = (MESHFREE_PT_points,)
+CLASSES = (MESHFREE_PT_select,)
