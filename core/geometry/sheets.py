@@ -12,6 +12,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spannin
 from scipy.spatial import cKDTree
 
 from ..algebra import blocks, on_all_cores
+from ..kernel import SUPPORT
 from ..types import Array, Bools, Floats, Ints
 from .components import label_connected, number_by_size
 from .distances import heights_of_ends, pair_heights
@@ -264,7 +265,8 @@ def separate_sheets(
     """Leave out the pairs whose ends lie on different sheets, which face each other across a gap.
 
     Normals decide it for most pairs. Where they leave a doubt, two points lie on one sheet if a path of short steps
-    joins them along it that is not much longer than their distance. A point that would keep fewer than a dozen pairs,
+    joins them along it that is not much longer than their distance, nor, where it leads around an edge, than the kernel
+    reaches. A point that would keep fewer than a dozen pairs,
     such as one that lies off all sheets, keeps all of them, as in `Nearest.keep`: so few would hardly couple it.
 
     Parameters
@@ -291,7 +293,11 @@ def separate_sheets(
     if not len(doubtful):
         return pairs
     first, second = pairs.first[doubtful], pairs.second[doubtful]
-    longest = _AROUND * pairs.distance[doubtful]
+    # Between points that face away from each other an arc would span more than a right angle. What joins them is a path
+    # around an edge: longer than the kernel reaches, but for its zigzag, it joins nothing.
+    away = np.einsum("pc,pc->p", oriented[first], oriented[second]) < 0.0
+    reach = np.where(away, SUPPORT * pairs.mean(pairs.lengths)[doubtful], np.inf)
+    longest = _AROUND * np.minimum(pairs.distance[doubtful], np.sqrt(0.5) * reach)
     apart = ways_along(step_lengths(nearest, sides, settle), nearest.tree, first, second, longest) > longest
     kept = np.ones(len(pairs.first), dtype=bool)
     kept[doubtful[apart]] = False

@@ -5,6 +5,7 @@ import pytest
 from scipy.sparse.csgraph import connected_components
 
 import core
+from benchmarks.awkward import box
 from benchmarks.samplings import (
     closed_plate,
     grid_points,
@@ -20,6 +21,7 @@ from core.geometry.cloud import read_cloud
 from core.geometry.nearest import find_nearest
 from core.geometry.pairs import Pairs, find_pairs
 from core.geometry.sheets import fit_sheets, same_sheet, separate_sheets, step_lengths, ways_along
+from core.kernel import SUPPORT
 from core.options import LaplacianOptions
 
 
@@ -149,6 +151,19 @@ class TestPairs:
 
     def test_none_through_a_closed_plate(self, plate):
         assert self.through_the_plate(plate, LaplacianOptions()) == 0
+
+    @pytest.mark.parametrize("thickness", [1.5, 2.0, 3.0])
+    def test_none_around_a_plate_beyond_the_kernel(self, thickness):
+        points = box([30.0, 30.0, thickness], int(1800 + 120 * thickness))
+        cloud = read_cloud(points, LaplacianOptions())
+        pairs, ends = cloud.pairs, cloud.scaled.first[np.stack([cloud.pairs.first, cloud.pairs.second])]
+        inset = np.stack([points[:, :2], 30.0 - points[:, :2]])
+        inner = (inset.min(axis=(0, 2)) > 1.0)[ends].all(axis=0)
+        inner &= np.abs(points[ends[0], 2] - points[ends[1], 2]) == thickness
+        along = np.abs(points[ends[0]] - points[ends[1]])[:, 1::-1]
+        around = np.hypot(inset[:, ends].sum(axis=1) + thickness, along).min(axis=(0, 2))
+        # A path of chords cuts right angles, by a factor of the root of two at most.
+        assert not np.any(inner & (around > np.sqrt(2.0) * SUPPORT * pairs.mean(pairs.lengths) * cloud.scaled.scale))
 
     def test_hardly_any_from_arm_to_arm_of_a_bent_capsule(self, capsule):
         assert self.across_the_arms(capsule, LaplacianOptions()) <= 2  # at its ends, where the spacing is half the gap
