@@ -130,8 +130,10 @@ def _draw_looks(layout, obj):
     if has_splats(data) or holds_columns(data):
         row.operator("meshfree.show_splats", icon="SHADING_RENDERED")
         return
-    row.enabled = DISC not in data.attributes and not (obj.type == "MESH" and data.polygons)
-    row.operator("meshfree.show_surface", icon="SHADING_SOLID", depress=DISC in data.attributes)
+    if obj.type == "MESH" and data.polygons:  # Blender shows these
+        return
+    row.enabled = DISC not in data.attributes
+    row.operator("meshfree.show_surface", icon="SHADING_SOLID", depress=not row.enabled)
 
 
 def _draw_followers(layout, context):

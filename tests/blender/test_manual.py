@@ -26,6 +26,8 @@ KEPT = {
     "profile",
     "spacing",
     "spacing_of",
+    "discs_of",
+    "shown_before",
     "slopes_of",
     "colors_behind",
     "deform",

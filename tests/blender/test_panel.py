@@ -235,14 +235,14 @@ def test_panel_of_a_new_object():
 def test_the_first_button_shows_points_of_other_importers_as_what_they_are(tmp_path, core):
     splat_files.write_ply(tmp_path / "a.ply", splat_files.some_columns(50))
     bpy.ops.wm.ply_import(filepath=str(tmp_path / "a.ply"))
-    assert draw()[:2] == ["Show as Splats", "a: 50 points"]
+    assert draw()[:2] == ["a: 50 points", "Show as Splats"]
     bpy.ops.meshfree.show_splats()
-    assert draw()[0] == "a: 50 splats"
+    assert draw()[:2] == ["a: 50 splats", "Show as Splats"]
     bpy.context.object.select_set(False)
     obj = add_object(sphere_points())
-    assert draw()[:2] == ["Show as Surface", "Cloud: 1,000 points"]
+    assert draw()[:2] == ["Cloud: 1,000 points", "Show as Surface"]
     bpy.ops.meshfree.show_surface()
-    assert draw()[0] == "Cloud: 1,000 points"
+    assert draw()[:2] == ["Cloud: 1,000 points", "Show as Surface"]  # it stays, so that nothing moves
     obj.data.attributes.remove(obj.data.attributes["lb_disc"])
     obj.data.clear_geometry()
     obj.data.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
