@@ -19,13 +19,16 @@ display = next(module for name, module in sys.modules.items() if name.endswith("
 display.shown_attribute(bpy.context.object)
 """
 MOVED = f"np.linalg.norm(attribute({CORAL}, 'lb_displacement'), axis=1).max()"
-# Buttons of the top bar, and of the menu *File*, from which others open to the right.
-_FILE, _NEW, _GENERAL, _IMPORT = (46, 14), (70, 38), (300, 37), (80, 311)
-_ENTRY = 22  # height of one
+_FILE, _NEW, _GENERAL = (46, 14), (70, 38), (300, 37)  # a button of the top bar, and those that it opens
+_DROP = f"""
+import os
+area, region, _ = view3d()
+with bpy.context.temp_override(window=main_window(), area=area, region=region):
+    bpy.ops.wm.drop_import_file("INVOKE_DEFAULT", directory=os.environ["HOME"], files=[{{"name": "{SAMPLE.name}"}}])
+"""
 _ORDERS = re.compile(  # words for what is to be done
     r"\b(press|click|choose|open|switch|drag a|set|delete|move the mouse|start|look at)\b", re.IGNORECASE
 )
-_BROWSER = "next((area for area in main_window().screen.areas if area.type == 'FILE_BROWSER'), None)"
 _MEMBERS = f"""
 def members(name):
     index = {CORAL}.vertex_groups[name].index
@@ -77,19 +80,12 @@ def import_sample(gui, quote, keep):
     quote("press Delete")
     gui.key("Delete")
     gui.wait_until("'Cube' not in bpy.data.objects")
-    quote("Choose *File > Import > Points*")
-    for place in (_FILE, _IMPORT, _points_entry(gui)):
-        gui.click(*(place(gui) if callable(place) else place))
-    gui.wait_until(f"{_BROWSER} is not None")
-    quote("click `coral.ply` in the file browser")
-    x, y, width, height = gui.region("WINDOW", "FILE_BROWSER")
-    for row in range(round(y) + 35, round(y + height), 20):
-        gui.click(x + 50, row)
-        if gui.python(f"{_BROWSER}.spaces.active.params.filename") == SAMPLE.name:
-            break
-    quote("press *Import Points*")
-    x, y, width, height = gui.region("EXECUTE", "FILE_BROWSER")
-    gui.click(x + width - 70, y + 0.5 * height)
+    quote("Drag `coral.ply` from your file manager into the 3D view")
+    gui.point_at_view()
+    gui.python(_DROP)
+    gui.settle()
+    quote("click *Import Points* in the menu")
+    gui.key("p")  # the letter that is underlined there
     gui.wait_until(f"'coral' in bpy.data.objects and {CORAL}.select_get() and not {WORKING}", 60)
     gui.wait_until(f"'lb_disc' in {CORAL}.data.attributes")
     quote("Move the mouse over the 3D view")
@@ -105,22 +101,28 @@ def import_sample(gui, quote, keep):
     keep("import")
 
 
-def _points_entry(gui):
-    """Return what finds the entry *Points*, the last but one of the menu that is open beside *Import*."""
-
-    def find(gui):
-        gui.settle()
-        x, y = _IMPORT[0] + 170, _IMPORT[1]
-        column = gui.pixels((x + 40, y, 1, 400)).max(axis=2)[:, 0]
-        dark = column < 45  # the menu, which the view is not; letters are above that
-        below = next(row for row in range(len(dark)) if not dark[row : row + 30].any())
-        return x + 100, y + below - 14 - _ENTRY
-
-    return find
+def drag(gui, quote, keep):
+    """Step 2: bent by the mouse, and back."""
+    quote("Press *Bend*")
+    gui.press("meshfree.deform_bind(at_once=True")
+    gui.wait_until(f"bpy.context.object.name == 'coral Handle' and not {WORKING}", 240)
+    quote("press G, move the mouse, and click")
+    x, y = gui.view_center()
+    gui.point_at_view()
+    gui.key("g")
+    for step in range(1, 6):
+        gui.move(x + 30 * step, y - 20 * step)
+    gui.click(x + 150, y - 100)
+    gui.wait_until(f"{MOVED} > 0.3")
+    gui.settle()
+    keep("dragged")
+    quote("Press Ctrl+Z twice")
+    gui.key("ctrl+z", "ctrl+z")
+    gui.wait_until(f"'coral Handle' not in bpy.data.objects and bpy.context.object == {CORAL}")
 
 
 def analyze(gui, quote, keep):
-    """Step 2: colors."""
+    """Step 3: colors."""
     quote("Press *Analyze Points*")
     gui.press("meshfree.analyze")
     gui.wait_until(f"'lb_area' in {CORAL}.data.attributes and not {WORKING}", 240)
@@ -142,7 +144,7 @@ def show(gui, name):
 
 
 def choose(gui, quote, keep):
-    """Step 3: groups."""
+    """Step 4: groups."""
     gui.python(_MEMBERS)
     quote("over the view, press Numpad 1")
     gui.point_at_view()
@@ -208,7 +210,7 @@ def _find(gui, press, button):
 
 
 def bend(gui, quote, keep):
-    """Step 4: bind, move and rotate."""
+    """Step 5: bind, move and rotate."""
     quote("Press *Bind* under *Bend*")
     _find(gui, gui.press, "meshfree.deform_bind")
     gui.wait_until("'coral Handle' in bpy.data.objects", 240)
@@ -227,7 +229,7 @@ def bend(gui, quote, keep):
 
 
 def color(gui, quote, keep):
-    """Step 5: how far the points went, and what the bent shape is like."""
+    """Step 6: how far the points went, and what the bent shape is like."""
     quote("Click the coral")
     gui.click(*gui.python("on_screen((0.0, 0.0, 0.3))"))
     gui.wait_until("bpy.context.object.name == 'coral'")
@@ -247,7 +249,7 @@ def color(gui, quote, keep):
 
 
 def render(gui, quote, keep):
-    """Step 6: a picture by the camera."""
+    """Step 7: a picture by the camera."""
     gui.python("rendered = []; bpy.app.handlers.render_complete.append(lambda *_: rendered.append(True))")
     quote("Look at the coral from where you like, with room around it")
     x, y = gui.view_center()
@@ -280,7 +282,7 @@ def _choose_standard(gui, setting):
     raise RuntimeError("The list has no entry Standard")
 
 
-STEPS = (import_sample, analyze, choose, bend, color, render)
+STEPS = (import_sample, drag, analyze, choose, bend, color, render)
 
 
 def play(gui, keep, page="tutorial.md", steps=STEPS):
@@ -288,8 +290,7 @@ def play(gui, keep, page="tutorial.md", steps=STEPS):
     # Those that are open before anybody opens or closes some.
     gui.open_panels("MESHFREE_PT_display", "MESHFREE_PT_statistics", "MESHFREE_PT_select")
     gui.new_file()
-    gui.python("bpy.context.preferences.view.filebrowser_display_type = 'SCREEN'")
-    (gui.folder / SAMPLE.name).write_bytes(SAMPLE.read_bytes())  # where the file browser opens
+    (gui.folder / SAMPLE.name).write_bytes(SAMPLE.read_bytes())
     quote = Reader((ROOT / "docs" / page).read_text(encoding="utf-8"))
     for step in steps:
         step(gui, quote, keep)

@@ -12,8 +12,10 @@ POINTS = 10000
 SAMPLE = """
 mesh = bpy.data.meshes.new("Coral")
 points = Coral().sample({count}).astype(np.float32)
+colors = np.insert(Coral().paint(points) / 255.0, 3, 1.0, axis=1).astype(np.float32)
 mesh.vertices.add(len(points))
 mesh.vertices.foreach_set("co", points.reshape(-1))
+mesh.color_attributes.new("Color", "BYTE_COLOR", "POINT").data.foreach_set("color_srgb", colors.reshape(-1))
 obj = bpy.data.objects.new("Coral", mesh)
 bpy.context.scene.collection.objects.link(obj)
 bpy.context.view_layer.objects.active = obj

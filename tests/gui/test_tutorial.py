@@ -71,7 +71,7 @@ class Seen:
 def test_every_step_as_it_is_written(gui):
     seen = Seen(gui)
     tutorial.play(gui, seen)
-    assert seen.names == ["import", "colors", "groups", "bent", "display", "result"]
+    assert seen.names == ["import", "dragged", "colors", "groups", "bent", "display", "result"]
     assert gui.python("coral.data.attributes['lb_displacement'].data[0].vector[:]") == [0.0, 0.0, 0.0]
 
 
