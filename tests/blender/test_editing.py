@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
+from mathutils import Matrix
 from numpy.testing import assert_allclose
 
 from tests.blender.clouds import add_group, add_object, attribute, local_points, sphere_points
@@ -143,3 +144,68 @@ def test_where_points_are_drawn(editing, display, obj):
 def test_nothing_is_attached_in_background_mode(editing):
     editing.attach()
     assert editing._handlers == []
+
+
+class TestDrawing:
+    """Pictures of the points as a view gets them, drawn without a window, which Blender can from 5.1 on."""
+
+    SIDE = 200
+
+    @pytest.fixture
+    def draw(self, editing, obj):
+        """A function that goes to Edit Mode, and draws the object from above, (side, side, 4), linear."""
+        gpu = pytest.importorskip("gpu")
+        if not hasattr(gpu, "init"):
+            pytest.skip("this Blender draws in windows only")
+        try:
+            gpu.init()
+        except SystemError as error:
+            pytest.skip(f"nothing can be drawn here: {error}")
+
+        def ask(clip=False):
+            if obj.mode != "EDIT":
+                bpy.ops.object.mode_set(mode="EDIT")
+                bpy.ops.mesh.select_mode(type="VERT")
+            screen = Matrix.Diagonal((0.8, 0.8, -0.1, 1.0))
+            planes = [(1.0, 0.0, 0.0, 0.0) if clip else (0.0, 0.0, 0.0, 1.0), *[(0.0, 0.0, 0.0, 1.0)] * 5]
+            view = {"view_matrix": Matrix(), "window_matrix": screen, "is_perspective": False, "view_distance": 5.0}
+            context = SimpleNamespace(
+                region_data=SimpleNamespace(**view, use_clip_planes=clip, clip_planes=planes),
+                region=SimpleNamespace(height=self.SIDE),
+                preferences=bpy.context.preferences,
+                evaluated_depsgraph_get=bpy.context.evaluated_depsgraph_get,
+            )
+            editing._kept.clear()
+            target = gpu.types.GPUOffScreen(self.SIDE, self.SIDE, format="RGBA32F")
+            with target.bind():
+                buffer = gpu.state.active_framebuffer_get()
+                buffer.clear(color=(0.0, 0.0, 0.0, 0.0), depth=1.0)
+                editing._draw_object(context, obj)
+                pixels = buffer.read_color(0, 0, self.SIDE, self.SIDE, 4, 0, "FLOAT")
+            return np.array(pixels.to_list())
+
+        yield ask
+        editing._kept.clear()
+        editing._shaders.clear()
+        if obj.mode == "EDIT":
+            bpy.ops.object.mode_set(mode="OBJECT")
+
+    @pytest.mark.any_blender
+    def test_colors_selection_and_clipping(self, draw, obj):
+        colors = np.tile(np.float32([0.1, 0.6, 0.2, 1.0]), (800, 1))
+        obj.data.color_attributes.new("Photo", "FLOAT_COLOR", "POINT").data.foreach_set("color", colors.reshape(-1))
+        points = local_points(obj)
+        obj.data.vertices.foreach_set("select", points[:, 0] > 0.0)
+        seen = draw()
+        inside = np.hypot(*np.mgrid[-1.25 : 1.25 : 1j * self.SIDE, -1.25 : 1.25 : 1j * self.SIDE]) < 0.95
+        assert (seen[inside, 3] == 1.0).mean() > 0.99
+        assert (seen[np.roll(inside, 100, axis=0) & ~inside, 3] == 1.0).mean() < 0.3
+        left, right = seen[60:140, 50:90], seen[60:140, 110:150]
+        ratio = left[..., :3] / left[..., 1:2]
+        assert_allclose(np.median(ratio, axis=(0, 1)), [1.0 / 6.0, 1.0, 1.0 / 3.0], rtol=0.02)
+        chosen = np.array(part("ui.colormaps").to_linear(bpy.context.preferences.themes[0].view_3d.vertex_select))
+        assert_allclose(np.median(right[..., 1] / right[..., 0]), chosen[1] / chosen[0], rtol=0.02)
+        assert 0.7 < left[..., 1].max() / 0.6 <= 1.0  # lit from the eye
+        clipped = draw(clip=True)
+        assert clipped[60:140, 50:75, 3].max() == 0.0
+        assert_allclose(clipped[60:140, 125:150], right[:, 15:], atol=1e-6)
