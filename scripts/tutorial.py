@@ -191,17 +191,10 @@ def _box(gui, *corners):
     gui.drag(*(gui.python(f"on_screen(({x}, 0.0, {z}))") for x, z in corners))
 
 
-def scroll(gui, steps):
-    """Turn the mouse wheel over the sidebar, downwards if above zero."""
-    x, y, width, height = gui.region("UI")
-    if steps:
-        gui.click(x + 0.4 * width, y + 0.5 * height, "wheel down" if steps > 0 else "wheel up", abs(steps))
-
-
 def _find(gui, press, button):
     """Press a button of the panel, or open a panel there, wherever one has to scroll to."""
     for steps in (0, -60, 12, 12, 12, 12, 12):
-        scroll(gui, steps)
+        gui.scroll(steps)
         try:
             return press(button)
         except WindowError as error:

@@ -32,6 +32,7 @@ PICTURES = ROOT / "build" / "gui"
 SIZE = (1280, 800)
 START = 120  # seconds that Blender may take to start on a busy machine
 DRAWING = 240  # seconds that it may take to draw, when shaders for a graphics card are compiled for the processor
+NOTICES = 6  # row of the sidebar with the notices of a cloud
 _BUTTON = 16  # pixels, less than a button is high: none is passed over
 _BUTTONS = {"left": 1, "middle": 2, "right": 3, "wheel up": 4, "wheel down": 5}
 
@@ -375,6 +376,19 @@ class Window:
         bright = (self.pixels((x, y, width or whole - 30, height)).max(axis=2) > 125).sum(axis=1) > 1
         edges = np.flatnonzero(np.diff(np.concatenate([[False], bright, [False]]).astype(int))).reshape(-1, 2)
         return [int(edge.mean()) for edge in edges if np.ptp(edge) > 4]
+
+    def scroll(self, steps):
+        """Turn the mouse wheel over the sidebar, downwards if above zero."""
+        x, y, width, height = self.region("UI")
+        if steps:
+            self.click(x + 0.4 * width, y + 0.5 * height, "wheel down" if steps > 0 else "wheel up", abs(steps))
+
+    def unfold_notices(self):
+        """Open or close the list of notices, the line above the first panel."""
+        x, y, width, _ = self.region("UI")
+        self.click(x + 0.35 * width, y + self.text_rows()[NOTICES])
+        self.point_at_view()
+        self.settle()
 
     def press(self, operator, region="UI", across=0.35):
         """Click on the button of an operator in the sidebar."""

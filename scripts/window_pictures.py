@@ -79,7 +79,7 @@ def box(gui, low, high):
 
 def working(gui):
     """An analysis that runs."""
-    begin(gui, "MESHFREE_PT_spectrum", count=60000)
+    begin(gui, "MESHFREE_PT_display", count=60000)
     gui.press("meshfree.analyze")
     gui.wait_until(WORKING)
     gui.point_at_view()
@@ -87,10 +87,8 @@ def working(gui):
 
 def analyzed(gui):
     """The points in colors."""
-    begin(gui, "MESHFREE_PT_spectrum", "MESHFREE_PT_display")
-    gui.press("meshfree.analyze")
-    gui.wait_until("'lb_area' in bpy.context.object.data.attributes", 180)
-    gui.settle()
+    begin(gui, "MESHFREE_PT_display", "MESHFREE_PT_statistics")
+    gui.python("bpy.ops.meshfree.spectrum(count=10)")
     gui.python("bpy.ops.meshfree.colormap(attribute='lb_eigenvector_008')")
     gui.python("bpy.context.object.select_set(False)")
     gui.point_at_view()
@@ -98,11 +96,8 @@ def analyzed(gui):
 
 def seeing(gui):
     """All that is drawn over the view."""
-    begin(gui, "MESHFREE_PT_spectrum")
-    gui.python("bpy.context.object.meshfree.modes = 30")
-    gui.press("meshfree.spectrum")
-    gui.wait_until("'lb_eigenvalues' in bpy.context.object", 180)
-    gui.settle()
+    begin(gui)
+    gui.python("bpy.ops.meshfree.spectrum(count=30)")
     gui.python("bpy.context.object.meshfree.histogram = bpy.context.object.meshfree.plot_eigenvalues = True")
     gui.python("bpy.ops.meshfree.colormap(attribute='lb_eigenvector_020')")
     gui.python("bpy.context.object.select_set(False)")
@@ -114,7 +109,7 @@ def seeing(gui):
 
 def groups(gui):
     """Points chosen in Edit Mode, for the groups that the panel makes."""
-    begin(gui, "MESHFREE_PT_points", count=6000)
+    begin(gui, "MESHFREE_PT_select", "MESHFREE_PT_deform", count=6000)
     gui.python(FRONT)
     gui.point_at_view()
     gui.key("Tab")
@@ -138,7 +133,7 @@ def deform(gui):
     box(gui, 1.1, 2.0)
     gui.search("Mesh-Free Handle")
     gui.key("Tab")
-    gui.press("meshfree.deform_bind")
+    gui.search("Mesh-Free Bind")
     gui.wait_until("'Coral Handle' in bpy.data.objects", 60)
     gui.python("bpy.data.objects['Coral Handle'].location.x += 0.7")
     gui.python("bpy.data.objects['Coral Handle'].rotation_euler.y = 0.7")

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests.gui.test_play import ANALYZED, WORKING, add_sphere, finish, shading
+from window import NOTICES
 
 # A scan with all that an analysis has something to tell of: noise, duplicates, strays, and a void.
 SCAN = """
@@ -14,7 +15,7 @@ points = np.concatenate([points[np.hypot(points[:, 0], points[:, 2] - 0.6) > 0.1
 add_object(points).select_set(True)
 bpy.ops.ed.undo_push(message="Scan")
 """
-NOTICES = "[(told.tool, told.level, told.text) for told in bpy.context.object.meshfree.notices]"
+TOLD = "[(told.tool, told.level, told.text) for told in bpy.context.object.meshfree.notices]"
 RED = (
     """
 space = bpy.context.preferences.themes[0].view_3d.space
@@ -89,27 +90,22 @@ class TestHeight:
         tab.point_at_view()
         tab.wait_until(ANALYZED, 90)
         finish(tab)
-        told = tab.python(NOTICES)
+        told = tab.python(TOLD)
         assert len(told) >= 3
         assert {level for _, level, _ in told} == {"NOTICE"}  # without a triangle
         after = tab.text_rows()
         tab.shot("tab_analyzed")
         moved = [row for row in before if min(abs(row - other) for other in after) > 2]
         assert moved == []
-        quick, line, show = before[4:7]
+        quick, line, show = before[NOTICES - 1 : NOTICES + 2]
         assert show - quick - 26 <= 30  # the line of the notices, whose neighbors are 26 and 28 pixels apart
         assert abs(line - 0.5 * (quick + show)) < 4
 
-        x, y, width, _ = tab.region("UI")
         folded = height(tab)
-        tab.click(x + 0.35 * width, y + line)
-        tab.point_at_view()
-        tab.settle()
+        tab.unfold_notices()
         tab.shot("notices_unfolded")
         assert height(tab) > folded + 60
-        tab.click(x + 0.35 * width, y + line)
-        tab.point_at_view()
-        tab.settle()
+        tab.unfold_notices()
         assert height(tab) == folded
 
 
@@ -122,7 +118,7 @@ class TestNotices:
         tab.python("bpy.ops.meshfree.analyze(); bpy.ops.ed.undo_push(message='Analyzed')")
         tab.open_tab()
         x, y, _, _ = tab.region("UI")
-        line = tab.text_rows()[5]
+        line = tab.text_rows()[NOTICES]
 
         def yellow():  # of the triangle
             red, green, blue = tab.pixels((x, y + line - 10, 60, 20)).astype(int).transpose(2, 0, 1)

@@ -109,18 +109,18 @@ class TestCleaning:
         gui.python(STRAYS)
         shading(gui, "WIREFRAME")
         gui.open_tab()
-        gui.press("meshfree.stray_points")
+        gui.press("meshfree.stray_points()")
         gui.wait_until("'lb_stray' in bpy.context.object.data.attributes", 90)
         finish(gui)
         gui.settle()
         found = gui.python("int((attribute(bpy.context.object, 'lb_stray') > 0).sum())")
         assert 12 <= found <= 15
-        gui.press("meshfree.stray_points(action='SELECT'", across=0.15)
+        gui.press("meshfree.stray_points(action='SELECT'")
         chosen = "sum(point.select for point in bpy.context.object.data.vertices)"
         gui.wait_until(f"{chosen} == {found}")
         finish(gui)
         gui.shot("strays")
-        gui.press("meshfree.stray_points(action='DELETE'", across=0.85)
+        gui.press("meshfree.stray_points(action='DELETE'", across=0.75)
         gui.wait_until(f"{COUNT} == {1512 - found}")
         finish(gui)
         gui.settle()
@@ -140,7 +140,7 @@ class TestCleaning:
 class TestMeasures:
     """Figures of selected points and of parts, and curves on the surface."""
 
-    @pytest.mark.parametrize("opened", [("MESHFREE_PT_points",)], indirect=True)
+    @pytest.mark.parametrize("opened", [("MESHFREE_PT_measure",)], indirect=True)
     def test_figures_follow_box_circle_lasso_and_undo(self, opened):
         gui = opened
         add_sphere(gui, 1500)

@@ -52,6 +52,8 @@ def opened(gui, request):
     gui.new_file()
     add_sphere(gui)
     gui.open_tab()
+    if request.param == "MESHFREE_PT_settings":  # the last ones
+        gui.scroll(60)
     yield gui
     gui.open_panels()
 
@@ -164,7 +166,7 @@ class TestView:
 class TestGroupColors:
     """Group Colors in Edit Mode."""
 
-    @pytest.mark.parametrize("opened", ["MESHFREE_PT_points"], indirect=True)
+    @pytest.mark.parametrize("opened", ["MESHFREE_PT_deform"], indirect=True)
     def test_undo_leaves_them_as_they_were(self, opened):
         shown = "bpy.context.object.meshfree.show_groups and len(bpy.context.object.modifiers)"
         groups = "bpy.context.object.vertex_groups.keys()"
@@ -205,7 +207,7 @@ class TestSidebar:
         finish(gui, 10)
         assert gui.python(UNCHANGED)
 
-    @pytest.mark.parametrize("opened", ["MESHFREE_PT_segment"], indirect=True)
+    @pytest.mark.parametrize("opened", ["MESHFREE_PT_make"], indirect=True)
     def test_a_gray_button_says_why(self, opened):
         gui = opened
         x, y = gui.find_button("meshfree.separate_by_segment")
@@ -227,8 +229,9 @@ class TestSidebar:
         notices = "[told.text for told in bpy.context.object.meshfree.notices]"
         told = gui.python(notices)
         assert told
+        gui.unfold_notices()
         gui.shot("notices")
-        gui.press("meshfree.dismiss", across=0.79)
+        gui.press("meshfree.dismiss", across=0.83)
         gui.wait_until(f"len({notices}) == {len(told) - 1}")
         gui.point_at_view()
         gui.key("ctrl+z")

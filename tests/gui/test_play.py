@@ -8,7 +8,6 @@ from tests.results import RESULTS
 ANALYZED = "'lb_area' in bpy.context.object.data.attributes"
 WORKING = "[operator.bl_idname for operator in main_window().modal_operators]"
 UNCHANGED = "everything(bpy.data.objects['Cloud']) == before"
-MODES = [f"lb_eigenvector_{mode:03}" for mode in range(1, 11)]
 
 HEIGHTS = """
 members = {group.name: [] for group in bpy.context.object.vertex_groups}
@@ -94,7 +93,7 @@ class TestAnalysis:
         assert gui.python(UNCHANGED)
         gui.key("ctrl+shift+z")
         gui.wait_until(ANALYZED)
-        assert gui.python("result_names(bpy.context.object)") == sorted([*RESULTS, *MODES])
+        assert gui.python("result_names(bpy.context.object)") == sorted(RESULTS)
 
     def test_colors_after_four_clicks(self, gui):
         add_sphere(gui)

@@ -63,5 +63,7 @@ def test_the_panel_of_the_armature_dismisses_notices_of_its_points(gui):
     gui.python("bpy.ops.meshfree.auto_weights(least=0.5); obj.meshfree.notices.clear()")
     gui.python("for number in range(2): obj.meshfree.notices.add().text = str(number)")
     gui.open_tab()
-    gui.press("meshfree.dismiss", across=0.81)
+    x, y, width, _ = gui.region("UI")
+    gui.click(x + 0.35 * width, y + gui.text_rows()[2])  # below the name of the cloud
+    gui.press("meshfree.dismiss", across=0.83)
     gui.wait_until("[notice.text for notice in bpy.data.objects['Cloud'].meshfree.notices] == ['1']")

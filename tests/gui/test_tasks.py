@@ -19,9 +19,8 @@ with bpy.context.temp_override(window=main_window(), area=area, region=region):
 IMPORTED = "'Egg' in bpy.data.objects"
 # By the operator of a button: what there is afterwards, and not before.
 TASKS = {
-    "smooth": "bool(bpy.data.objects['Cloud'].data.shape_keys)",
     "segment": "'lb_segment' in bpy.data.objects['Cloud'].data.attributes",
-    "principal_curvatures": "'lb_shape_index' in bpy.data.objects['Cloud'].data.attributes",
+    "analyze(at_once=True": "'lb_mean_curvature' in bpy.data.objects['Cloud'].data.attributes",
     "deform_bind": "bpy.context.object.name == 'Cloud Handle'",
 }
 # By what the search finds: the attribute, and what it is at a point where the surface faces the viewer.
@@ -138,7 +137,7 @@ class TestTasks:
         shading(gui, "WIREFRAME")
         gui.open_tab()
         assert not gui.python(done)
-        gui.press(f"meshfree.{task}", across=0.35 if task in ("smooth", "principal_curvatures") else 0.75)
+        gui.press(f"meshfree.{task}", across=0.35 if task.startswith("analyze") else 0.75)
         gui.wait_until(done, 90)
         finish(gui)
         gui.settle()
