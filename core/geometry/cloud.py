@@ -205,14 +205,14 @@ def measure_surface(
     sample, quadrics, nearest = surface.sample, surface.quadrics, surface.sample.nearest
     decisions = sample.decisions
 
-    report("Normals", 0.18)
+    report("Normals", 0.25)
     oriented = orient_surface(surface, given)
-    report("Neighbors", 0.2)
+    report("Neighbors", 0.36)
     gaussian = quadrics.gaussian_curvature
     sides = one_side(quadrics, oriented) if given is not None else find_sides(nearest, quadrics).toward(oriented)
 
     def cells_within(boundary: Boundary, before: Cells | None = None) -> Cells:
-        reported = functools.partial(report, "Neighbors", 0.2)
+        reported = functools.partial(report, "Neighbors", 0.36)
         return measure_cells(nearest, sides.normals, gaussian, boundary, sample.component, reported, before, sides)
 
     cells = cells_within(no_boundary(len(oriented)))
@@ -225,16 +225,16 @@ def measure_surface(
     if len(voids.rims):
         edge = measure_boundary(nearest, oriented, as_mask(voids.rims, len(oriented)) | edge.at_boundary)
         cells = cells_within(edge, cells)
-    report("Neighbors", 0.25)
+    report("Neighbors", 0.48)
     lengths = smoothing_lengths(nearest, oriented, quadrics, cells, edge, options, sample.component, decisions)
-    first_and_second = find_pairs(nearest.tree, lengths, lambda: report("Neighbors", 0.3), nearest)
+    first_and_second = find_pairs(nearest.tree, lengths, lambda: report("Neighbors", 0.6), nearest)
     pairs = Pairs(nearest.points, lengths, *first_and_second)
     parted = edge.parting(nearest.tree, sides.normals, pairs.first, pairs.second, gaps)
     if len(parted):
         pairs = pairs.keep(~as_mask(parted, len(pairs.first)))
     own = oriented if given is None else given
 
-    report("Neighbors", 0.4)
+    report("Neighbors", 0.64)
     if options.sheets:
         settle = functools.partial(decisions.bridges, sample.scaled)
         pairs = separate_sheets(pairs, nearest, oriented, sides.normals, settle)
@@ -303,15 +303,15 @@ def read_surface(
     scaled = scale_points(points if kept is None else points[kept], decisions)
     if kept is not None:
         scaled = scaled.among(kept, len(points))
-    report("Normals", 0.02)
-    sample = leave_outliers(scaled, lambda: report("Normals", 0.04), decisions)
-    report("Normals", 0.06)
+    report("Normals", 0.01)
+    sample = leave_outliers(scaled, lambda: report("Normals", 0.1), decisions)
+    report("Normals", 0.13)
     sample = divide_components(sample)
-    report("Normals", 0.1)
+    report("Normals", 0.15)
     surface = with_scatter(fit_surface(sample, options.sheets))
-    report("Normals", 0.12)
+    report("Normals", 0.18)
     surface = remove_noise(surface, options)
-    report("Normals", 0.16)
+    report("Normals", 0.22)
     return scaled, divide_sheets(surface) if options.sheets else surface
 
 

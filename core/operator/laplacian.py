@@ -461,13 +461,13 @@ def build_laplacian(
     check_memory(len(checked), options)
 
     cloud = read_cloud(checked, options, normals, boundary, boundary_distance, report, left_out, agreed)
-    report("Areas", 0.5)
+    report("Areas", 0.72)
     distance = arc_length(cloud)
-    areas = solve_areas(cloud, distance, lambda: report("Areas", 0.6))
+    areas = solve_areas(cloud, distance, lambda: report("Areas", 0.73))
 
-    report("Operator", 0.8)
+    report("Operator", 0.75)
     cloud = replace(cloud, pairs=replace(cloud.pairs, distance=distance))  # frees the memory of distances in space
-    return assemble_laplacian(checked, cloud, areas, options, lambda: report("Operator", 0.8))
+    return assemble_laplacian(checked, cloud, areas, options, lambda: report("Operator", 0.75))
 
 
 def assemble_laplacian(
