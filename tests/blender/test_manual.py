@@ -29,8 +29,6 @@ KEPT = {
     "discs_of",
     "shown_before",
     "slopes_of",
-    "discs_of",
-    "shown_before",
     "colors_behind",
     "deform",
     "stages",
