@@ -273,8 +273,9 @@ def ablation(title, chosen):
 
 def _set(values):
     for module, name, value in values:
-        for user in MODULES if not name.startswith("_") else [module]:  # others may have imported it
-            if hasattr(user, name):
+        before = getattr(module, name)
+        for user in MODULES:  # others may have imported it, or have one of their own by that name
+            if getattr(user, name, None) is before:
                 setattr(user, name, value)
     areas._inverse.cache_clear()
 
