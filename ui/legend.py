@@ -6,7 +6,6 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from ..core import PointCloudError
-from ..operators.deform.deleted import LEGEND_OF
 from ..operators.registration import Registration, Row
 from ..operators.running.ready import ReadyOperator, reporting
 from .canvas import PLATE_CORNERS
@@ -17,6 +16,7 @@ from .plots import HEIGHT, legend_picture
 from .scale import shown_scale
 
 NAME = "Mesh-Free Legend"  # of new data; found by the properties below, whatever its name
+_OF = "meshfree_legend_of"  # custom property of the collection: the object whose colours it explains
 _TITLE = "meshfree_legend_title"  # custom property of the collection: the default title, the name of the attribute
 _PART = "meshfree_legend_part"  # custom property of an object in it: its part of the legend
 _FONT = "meshfree_legend_font"  # custom property of the font of its texts
@@ -52,14 +52,14 @@ def make_legend(scene, obj, camera, title: str = ""):
     if collection is None:
         collection = bpy.data.collections.new(NAME)
         scene.collection.children.link(collection)
-    collection[LEGEND_OF] = obj
+    collection[_OF] = obj
     _fill(collection, scene, obj, camera, title)
     return collection
 
 
 def find_legend(scene, obj):
     """Return the collection with the legend of an object in a scene, or None without objects in it."""
-    return next((item for item in _legends(scene) if item[LEGEND_OF] == obj and item.objects), None)
+    return next((item for item in _legends(scene) if item[_OF] == obj and item.objects), None)
 
 
 def renew(obj):
@@ -126,7 +126,7 @@ class MESHFREE_OT_legend(ReadyOperator, bpy.types.Operator):
 
 def _legends(scene):
     """Return the editable legends in a scene: one, unless it was copied."""
-    return (item for item in scene.collection.children_recursive if LEGEND_OF in item and item.is_editable)
+    return (item for item in scene.collection.children_recursive if _OF in item and item.is_editable)
 
 
 def _is_shared(legend, scene):

@@ -1,7 +1,8 @@
 """Objects that were deleted: properties of this extension that refer to them do not keep them alive.
 
 Blender counts such a property as a user, and leaves an object with users in the file when it is deleted, out of sight,
-still at work in modifiers.
+still at work in modifiers. Here it is let go of after the step of undo has ended, which so does not bring references
+back where nothing else of their owner has changed: what was let go of is remembered.
 """
 
 from collections import Counter
@@ -11,67 +12,72 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from ..objects.handlers import add_handlers, remove_handlers
-from ..objects.reading import TYPES
-from .binding import bound_objects, forget_bound
+from ..objects.reading import TYPES, find_object
+from .binding import bound_objects
 from .nodes import is_baked
 from .pose import POSE, State, write_displacement
 
-LEGEND_OF = "meshfree_legend_of"  # custom property of the collection of a legend: the object whose colors it explains
-_soon = set()  # what is due in the background
+_left = set()  # owner's and target's session_uid, and the path of the property, of what was let go of
 
 
-def _references() -> Counter:
-    """Count the properties of this extension that refer to each object."""
-    found = Counter(collection.get(LEGEND_OF) for collection in bpy.data.collections)
-    for obj in bpy.data.objects:
-        if obj.type in TYPES:
-            kept = obj.meshfree
-            found.update([kept.compared_with, kept.deform.armature, *(item.empty for item in kept.deform.handle_items)])
-    del found[None]
-    return found
+def _references(obj):
+    """Yield the properties of this extension of an object that refer to objects, by their paths, and these."""
+    kept, deform = obj.meshfree, obj.meshfree.deform
+    yield "meshfree.compared_with", kept.compared_with
+    yield "meshfree.deform.armature", deform.armature
+    for number, item in enumerate(deform.handle_items):
+        yield f"meshfree.deform.handle_items[{number}].empty", item.empty
 
 
-def remove_deleted():
-    """Remove the objects that nothing uses but properties of this extension; what followed their bones is at rest."""
-    gone = {obj for obj, count in _references().items() if obj.users <= count and obj.library is None}
-    if gone:
-        bpy.data.batch_remove(gone)
-        forget_bound()
+def let_go():
+    """Let go of objects that nothing uses but properties of this extension; what followed their bones is at rest."""
+    found = [(obj, *each) for obj in bpy.data.objects if obj.type in TYPES for each in _references(obj) if each[1]]
+    counted = Counter(target for _, _, target in found)
+    gone = {target for target, count in counted.items() if target.users <= count and target.library is None}
+    for obj in bpy.data.objects if gone else ():
+        for item in obj.modifiers:
+            if item.type == "ARMATURE":
+                found.append((obj, f'modifiers["{bpy.utils.escape_identifier(item.name)}"].object', item.object))
+    for owner, path, target in found:
+        if target in gone:
+            _left.add((owner.session_uid, target.session_uid, path))
+            _refer(owner, path, None)
     for obj in bound_objects():
         deform, moved = obj.meshfree.deform, len(obj.data.get(POSE, ())) > 1
         if len(deform.bone_items) and deform.armature is None and moved and not is_baked(obj) and obj.data.is_editable:
             write_displacement(obj, np.zeros((deform.point_count, 3)), np.zeros(0), State.SETTLED, {})
 
 
+def _refer(owner, path, target):
+    """Let a property of an object refer to another object, or to none."""
+    holder, _, name = path.rpartition(".")
+    setattr(owner.path_resolve(holder), name, target)
+
+
 @persistent
 def _on_update(_scene, depsgraph):
-    """Look for deleted objects soon after collections have changed, since other handlers still see them now."""
+    """Look for deleted objects when collections have changed."""
     if depsgraph.id_type_updated("COLLECTION"):
-        if bpy.app.background:
-            _soon.add(remove_deleted)
-        elif not bpy.app.timers.is_registered(remove_deleted):
-            bpy.app.timers.register(remove_deleted, first_interval=0.0)
+        let_go()
 
 
 @persistent
-def _on_next(*_):
-    """Do in the background, where there are no timers, what is due."""
-    while _soon:
-        _soon.pop()()
+def _on_undo(*_):
+    """Refer to objects again that are back."""
+    for owner_uid, target_uid, path in [*_left]:
+        owner, target = find_object(owner_uid), find_object(target_uid)
+        if owner is not None and target is not None and target.users_collection:
+            _left.discard((owner_uid, target_uid, path))
+            _refer(owner, path, target)
 
 
 @persistent
 def _on_file(*_):
-    remove_deleted()
+    _left.clear()
+    let_go()
 
 
-_HANDLERS = {
-    "depsgraph_update_post": _on_update,
-    "depsgraph_update_pre": _on_next,
-    "render_init": _on_next,
-    "save_pre": _on_next,
-    "load_post": _on_file,
-}
+_HANDLERS = {"depsgraph_update_post": _on_update, "undo_post": _on_undo, "redo_post": _on_undo, "load_post": _on_file}
 
 
 def attach():
@@ -82,6 +88,4 @@ def attach():
 def detach():
     """Stop that."""
     remove_handlers(_HANDLERS)
-    _soon.clear()
-    if bpy.app.timers.is_registered(remove_deleted):
-        bpy.app.timers.unregister(remove_deleted)
+    _left.clear()

@@ -108,6 +108,7 @@ class TestView:
         settings = "bpy.data.objects['Cloud'].meshfree"
         gui.python(COLORED)
         gui.python(f"{settings}.histogram = {settings}.plot_eigenvalues = False")
+        gui.python(f"{settings}.legend_place = 1.0, 0.02")  # else it makes room for the points
 
         def drawn():
             return colors(gui.pixels(corner(gui)))

@@ -28,6 +28,14 @@ def with_surface(gui, count):
     gui.python("bpy.ops.meshfree.show_surface(); known = bpy.context.object.meshfree.discs_of; bpy.ops.ed.undo_push()")
 
 
+MOVED = """
+from bpy_extras.view3d_utils import region_2d_to_location_3d
+_, region, space = view3d()[0], view3d()[1], view3d()[0].spaces.active
+behind = region_2d_to_location_3d(region, space.region_3d, ({}, {}), (0.0, 0.0, 0.0))
+bpy.context.object.location = behind
+"""
+
+
 @pytest.mark.parametrize("count", [3000, 90_000])  # at once, and in a thread
 def test_discs_follow_thinning(gui, count):
     with_surface(gui, count)
@@ -57,7 +65,7 @@ def test_a_deleted_object_goes(gui):
     gui.python("bpy.context.view_layer.objects.active = other; bpy.ops.ed.undo_push()")
     gui.point_at_view()
     gui.key("Delete")
-    gui.wait_until("'Other' not in bpy.data.objects")
+    gui.wait_until("bpy.data.objects['Other'].users == 0")  # which is not saved
     assert gui.python("bpy.data.objects['Cloud'].meshfree.compared_with is None")
     gui.key("ctrl+z")
     gui.wait_until("bpy.data.objects['Cloud'].meshfree.compared_with == bpy.data.objects['Other']")
@@ -86,7 +94,7 @@ def test_the_legend_is_small_and_covers_nothing(gui, scale):
         behind, corner, left = gui.python(COVERED)
         assert behind == 0
         assert left < 24.0
-        gui.python("bpy.context.object.location = 2.5, 0.0, -1.0")  # where the legend was
+        gui.python(MOVED.format(*corner))
         gui.settle()
         gui.shot(f"legend_moved_{scale}")
         behind, moved, _ = gui.python(COVERED)
