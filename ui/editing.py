@@ -202,6 +202,16 @@ def _forget(*_):
 
 
 @persistent
+def on_load(*_):
+    """Draw clouds of files by earlier versions here, too, which let nodes draw them in Edit Mode."""
+    _kept.clear()
+    for obj in [obj for obj in bpy.data.objects if is_cloud(obj) and obj.is_editable]:
+        display = find_display(obj)
+        if display is not None:
+            display.show_in_editmode = False
+
+
+@persistent
 def _on_update(_scene, depsgraph):
     """Forget what has changed: the points, or their selection alone."""
     for update in depsgraph.updates if _kept else ():
@@ -218,7 +228,7 @@ _HANDLERS = {
     "frame_change_post": _forget,
     "undo_post": _forget,
     "redo_post": _forget,
-    "load_post": _forget,
+    "load_post": on_load,
     "colors_changed": _forget,
     "shape_changed": _forget,
     "groups_changed": _forget,

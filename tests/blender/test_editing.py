@@ -141,6 +141,15 @@ def test_where_points_are_drawn(editing, display, obj):
     assert not editing.is_drawn(add_object(sphere_points(10)), SOLID)
 
 
+def test_files_of_earlier_versions(editing, display, obj):
+    display.find_display(obj).show_in_editmode = True
+    meshed = add_object(sphere_points(40), faces=[(0, 1, 2)])
+    part("ui.show").show_surface(meshed)
+    editing.on_load()
+    assert not display.find_display(obj).show_in_editmode
+    assert display.find_display(meshed).show_in_editmode
+
+
 def test_nothing_is_attached_in_background_mode(editing):
     editing.attach()
     assert editing._handlers == []
