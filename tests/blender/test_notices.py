@@ -10,7 +10,7 @@ import pytest
 
 from tests.blender.clouds import add_object, grid_points, sphere_points
 from tests.blender.conftest import part
-from tests.blender.test_panel import Layout, draw
+from tests.blender.test_panel import Layout, Narrow, draw
 
 ROOT = Path(__file__).parents[2]
 FACES = "The mesh has 1 faces: only its 1000 vertices are used."
@@ -259,20 +259,6 @@ def test_a_change_meanwhile_is_told_on_the_object_too():
     assert Try().complete(bpy.context, job) == {"CANCELLED"}
     assert texts(obj) == reports
     assert reports[0].startswith("Try wrote nothing: ")
-
-
-class Narrow:
-    """A region of some width, in a context that is Blender's otherwise."""
-
-    def __init__(self, width, kind="UI"):
-        view = SimpleNamespace(region_to_view=lambda x, y: (x, y))
-        self.region = SimpleNamespace(width=width, type=kind, view2d=view)
-        self.preferences = SimpleNamespace(
-            system=SimpleNamespace(ui_scale=1.0), ui_styles=bpy.context.preferences.ui_styles
-        )
-
-    def __getattr__(self, name):
-        return getattr(bpy.context, name)
 
 
 def test_texts_are_wrapped_by_the_width_of_the_region():

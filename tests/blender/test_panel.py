@@ -44,13 +44,16 @@ class Layout:
 
     use_property_split = False
 
-    def __init__(self, texts=None, icons=None, buttons=None):
+    def __init__(self, texts=None, icons=None, buttons=None, before=None):
         self.texts = [] if texts is None else texts
         self.icons = {} if icons is None else icons
         self.buttons = [] if buttons is None else buttons
+        self.before = set() if before is None else before  # names that are drawn before settings
 
     def row(self, **_):
-        return Layout(self.texts, self.icons, self.buttons)
+        within = Layout(self.texts, self.icons, self.buttons, self.before)
+        within.use_property_split = self.use_property_split
+        return within
 
     column = box = grid_flow = split = row
 
@@ -78,6 +81,9 @@ class Layout:
     def prop(self, data, path, text=None, toggle=False, slider=False):
         data.path_resolve(path)
         self.texts.append(text or path)
+        setting = data.bl_rna.properties.get(path) if hasattr(data, "bl_rna") else None
+        if self.use_property_split and setting is not None and setting.type != "BOOLEAN":
+            self.before.add(text or setting.name)
 
     def prop_search(self, data, path, search_data, search_property, results_are_suggestions=False):
         search_data.path_resolve(search_property)
@@ -103,6 +109,20 @@ class Layout:
         assert path in self.operator(idname).__dict__
 
 
+class Narrow:
+    """A region of some width, in a context that is Blender's otherwise."""
+
+    def __init__(self, width, kind="UI"):
+        view = SimpleNamespace(region_to_view=lambda x, y: (x, y))
+        self.region = SimpleNamespace(width=width, type=kind, view2d=view)
+        self.preferences = SimpleNamespace(
+            system=SimpleNamespace(ui_scale=1.0), ui_styles=bpy.context.preferences.ui_styles
+        )
+
+    def __getattr__(self, name):
+        return getattr(bpy.context, name)
+
+
 class Settings(SimpleNamespace):
     """Stands in for an operator whose dialog is drawn: the values of its properties."""
 
@@ -118,17 +138,17 @@ def settings_of(operator, repeated=False, **values):
     return kind(**values)
 
 
-def draw(names=PANELS, icons=None, buttons=None):
-    """Texts of panels for the active object; icons of labels and buttons go where it is given."""
-    texts = []
+def draw(names=PANELS, icons=None, buttons=None, before=None, context=None):
+    """Texts of panels for the active object; icons of labels, buttons and names of settings go where it is given."""
+    texts, context = [], bpy.context if context is None else context
     for name in names:
         panel = getattr(bpy.types, f"MESHFREE_PT_{name}")
         if not hasattr(panel, "poll") or panel.poll(bpy.context):
             more = {"draw_more": panel.draw_more} if hasattr(panel, "draw_more") else {}
             stands_in = type(
-                "StandsIn", (), {"layout": Layout(texts, icons, buttons), "bl_label": panel.bl_label, **more}
+                "StandsIn", (), {"layout": Layout(texts, icons, buttons, before), "bl_label": panel.bl_label, **more}
             )
-            panel.draw(stands_in(), bpy.context)
+            panel.draw(stands_in(), context)
     return texts
 
 
@@ -383,6 +403,23 @@ def test_no_two_tools_have_the_same_row():
     places = [(kind, *row[:3]) for kind, row in rows if row]
     assert len(places) > 60
     assert len(set(places)) == len(places)
+
+
+def test_no_label_is_cut_off_at_the_default_width(core):
+    """That of the sidebar is 291 pixels; of a panel in it 235 are for a row, two fifths of these for names."""
+    measure, before, texts = part("ui.wrapping")._measure(Narrow(291)), set(), set()
+    for obj in (add_object(sphere_points()), add_splats(bar_splats(core))):
+        bpy.context.view_layer.objects.active = obj
+        bpy.ops.meshfree.spectrum(count=3)
+        bpy.ops.meshfree.principal_curvatures(display="DIRECTION")
+        for name in ("lb_direction_1", "lb_area"):
+            bpy.ops.meshfree.colormap(attribute=name)
+            texts |= set(draw(before=before, context=Narrow(291)))
+    assert len(before) > 10
+    assert [name for name in before if measure(name) > 0.4 * 235] == []
+    assert [text for text in texts if measure(text) > 225] == []
+    quick = [tool.quick.text for tool in tools().values() if tool.quick and tool.quick.home == "Object"]
+    assert [text for text in quick if measure(text) > 105] == []
 
 
 @pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
