@@ -330,5 +330,5 @@ def eigenvector_name(mode: int) -> str:
     return f"{EIGENVECTOR}{mode:03d}"
 
 
-RESULTS = written_by("analyze")  # always in the panel; those of tools if they exist
+RESULTS = written_by("analyze")  # first in the list of results
 APPLICATIONS = tuple(row.attribute for row in QUANTITIES if row.tool != "analyze" and not row.numbered)

@@ -3,11 +3,10 @@
 from typing import NamedTuple
 
 from ..operators import registration
-from ..operators.objects.attributes import point_count
 from ..operators.objects.modifiers import is_own
 from ..operators.objects.reading import obstacle, sharing_objects
 from ..operators.objects.result import is_analyzed, is_stale
-from ..operators.objects.splats import LEFT_BEHIND, are_left_behind, has_splats
+from ..operators.objects.splats import LEFT_BEHIND, are_left_behind
 from ..operators.running.job import running
 from .wrapping import beside_or_below, draw_text, fitting
 
@@ -120,8 +119,3 @@ def draw_table(layout, context, lines):
         row = beside_or_below(column, context, name, value)
         row.label(text=name)
         row.label(text=value)
-
-
-def points_text(obj) -> str:
-    """Return the name of an object, and how many points or splats it has."""
-    return f"{obj.name}: {point_count(obj.data):,} {'splats' if has_splats(obj.data) else 'points'}"

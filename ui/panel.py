@@ -4,14 +4,14 @@ import bpy
 
 from ..operators import registration
 from ..operators.deform.handles import handled_object
-from ..operators.objects.attributes import DISC
+from ..operators.objects.attributes import DISC, point_count
 from ..operators.objects.modifiers import is_sequence
 from ..operators.objects.reading import TYPES, obstacle
 from ..operators.objects.result import area_text, is_analyzed, trusted_text
 from ..operators.objects.splats import has_splats, holds_columns
 from ..operators.running.application import ApplicationOperator
 from ..operators.running.job import running
-from .notices import draw_figures, draw_status, draw_table, points_text
+from .notices import draw_figures, draw_status, draw_table
 from .wrapping import draw_text
 
 _EDITING = "Choose points here, in Edit Mode. Switch to Object Mode to analyze"
@@ -78,11 +78,15 @@ class MESHFREE_PT_main(SidebarPanel, bpy.types.Panel):
             if obj is not None or running() is not None:
                 draw_status(layout, context, obj)
         else:
-            draw_text(layout, context, points_text(obj), f"OUTLINER_OB_{obj.type}")
+            draw_text(layout, context, _points_text(obj), f"OUTLINER_OB_{obj.type}")
             _draw_looks(layout, obj)
             layout.operator("meshfree.analyze")
             draw_tasks(layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True))
             draw_status(layout, context, obj)
+
+
+def _points_text(obj):
+    return f"{obj.name}: {point_count(obj.data):,} {'splats' if has_splats(obj.data) else 'points'}"
 
 
 def draw_tools(layout, home, without=()):
@@ -143,7 +147,7 @@ def _draw_followers(layout, context):
         draw_text(layout, context, "Select points, too: Rig lets them follow the bones", "OUTLINER_OB_ARMATURE")
         draw_status(layout, context, None)
     for other in chosen:
-        draw_text(layout, context, points_text(other), f"OUTLINER_OB_{other.type}")
+        draw_text(layout, context, _points_text(other), f"OUTLINER_OB_{other.type}")
         draw_status(layout, context, other, f"notices_{other.name}")
 
 

@@ -196,7 +196,7 @@ class MESHFREE_PG_settings(with_properties(LAPLACIAN.values()), bpy.types.Proper
     )
     show_groups: BoolProperty(
         name="Group Colors",
-        description="Color the points of the groups below, on top of the display",
+        description="Color the points of the groups that tools use, on top of the display",
         default=False,
         update=_show_groups,
     )
