@@ -46,6 +46,8 @@ def tab(gui, request):
     closed = getattr(request, "param", False)
     gui.open_panels(*(() if closed else ("MESHFREE_PT_display", "MESHFREE_PT_statistics")))
     gui.new_file()
+    gui.python("overlay = view3d()[0].spaces.active.overlay; overlay.show_axis_x = overlay.show_axis_y = False")
+    gui.python("overlay.show_floor = False")  # which are seen through the sidebar
     yield gui
     gui.open_panels()
 
@@ -205,7 +207,14 @@ class TestDialogs:
         add_sphere(gui, 500)
         shading(gui, "WIREFRAME")
         gui.key("Tab", "alt+a", "Tab")
-        gui.python("bpy.app.timers.register(lambda: bpy.ops.meshfree.geodesic_distance('INVOKE_DEFAULT') and None)")
+        gui.point_at_view()
+        gui.python(
+            """
+with bpy.context.temp_override(window=main_window()):  # without a region
+    bpy.ops.meshfree.geodesic_distance("INVOKE_DEFAULT")
+None
+"""
+        )
         gui.settle()
         gui.shot("dialog_without_sources")
         gui.key("Return")
