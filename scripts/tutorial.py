@@ -104,7 +104,7 @@ def import_sample(gui, quote, keep):
 def drag(gui, quote, keep):
     """Step 2: bent by the mouse, and back."""
     quote("Press *Bend*")
-    gui.press("meshfree.deform_bind(at_once=True")
+    gui.press("meshfree.deform_bind(", across=0.75)  # in the right column
     gui.wait_until(f"bpy.context.object.name == 'coral Handle' and not {WORKING}", 240)
     quote("press G, move the mouse, and click")
     x, y = gui.view_center()
@@ -113,7 +113,7 @@ def drag(gui, quote, keep):
     for step in range(1, 6):
         gui.move(x + 30 * step, y - 20 * step)
     gui.click(x + 150, y - 100)
-    gui.wait_until(f"{MOVED} > 0.3")
+    gui.wait_until(f"{MOVED} > 0.3 and not {WORKING}", 240)
     gui.settle()
     keep("dragged")
     quote("Press Ctrl+Z twice")

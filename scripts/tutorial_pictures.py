@@ -27,6 +27,7 @@ scene.render.engine, scene.cycles.samples = "CYCLES", 32
 scene.cycles.use_denoising = False  # Debian's Blender cannot
 scene.render.resolution_x, scene.render.resolution_y = 960, 600
 bpy.context.preferences.view.render_display_type = "AREA"
+bpy.ops.ed.undo_push()
 """
 RENDERED = "bpy.data.images['Render Result'].save_render(bpy.app.tempdir + 'result.png')"
 

@@ -11,6 +11,7 @@ RENDERING = """
 scene = bpy.context.scene
 scene.eevee.taa_render_samples, scene.render.resolution_percentage = 1, 15
 bpy.context.preferences.view.render_display_type = "AREA"
+bpy.ops.ed.undo_push()
 """
 SELECTED = """
 coral = bpy.data.objects["coral"]
@@ -19,6 +20,7 @@ coral.data.vertices.foreach_get("select", chosen)
 [bpy.context.object.name, coral.select_get(), chosen.sum()]
 """
 PLACES = """
+coral = bpy.data.objects["coral"]  # another one after undo
 coral.update_from_editmode()
 places = np.array([vertex.co[:] for vertex in coral.data.vertices])
 """
