@@ -64,7 +64,7 @@ def seen_points(
     >>> import meshfree_laplacian as mf
     >>> points = mf.example_sphere()
     >>> seen = mf.distance.seen_points(points, 0.12, direction=[0, 0, -1], normals=points)
-    >>> print(points[seen, 2].min() > -0.1, points[~seen, 2].max() < 0.1)
+    >>> print(points[seen, 2].min() > -0.2, points[~seen, 2].max() < 0.2)
     True True
     """
     places = as_doubles(check_array(points, "Points", [(None, 3)], "Give numbers (n, 3)."))

@@ -244,7 +244,7 @@ class TestEnding:
 
         def progress(stage, fraction):
             builds.append((stage, fraction))
-            if builds.count(("Areas", 0.5)) == 4:  # of the given points twice, then of each step
+            if builds.count(("Areas", 0.72)) == 4:  # of the given points twice, then of each step
                 raise core.Cancelled
 
         film = core.deform.minimal_surface(points, fixed, progress=progress)
