@@ -75,7 +75,7 @@ def test_points_have_their_colors_and_selected_ones_that_of_selections(scan):
 
 def test_xray_shows_the_dots_of_blender(scan):
     scan.key("alt+z")
-    scan.wait_for(lambda: shares(scan)[2] > 0.8, "the dots are black")
+    scan.wait_for(lambda: shares(scan)[2] > 0.2 and shares(scan)[0] == 0.0, "there are black dots alone")
     scan.key("alt+z")
     scan.wait_for(lambda: shares(scan)[0] > 0.95, "the scan is green")
 
