@@ -158,7 +158,7 @@ def choose(gui, quote, keep):
     gui.press(".meshfree.show_groups", across=0.6)
     gui.wait_until(f"{CORAL}.meshfree.show_groups")
     quote("Then open *Move*")
-    gui.open_panel(".meshfree.deform.handles")
+    _find(gui, gui.open_panel, ".meshfree.deform.handles")
     quote("press B")
     gui.point_at_view()
     gui.key("b")
