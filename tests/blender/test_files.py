@@ -237,7 +237,7 @@ class TestClassesAndWithheldPoints:
         las.vlrs.append(laspy.vlrs.known.WktCoordinateSystemVlr('PROJCS["a",UNIT["foot",0.3048]]'))
         las.x = las.x + 1e6
         las.write(str(path))
-        for meters, factor, told in ((False, 1.0, "set Unit Scale"), (True, 0.3048, "converted to meters")):
+        for meters, factor, told in ((False, 1.0, "Set Unit Scale"), (True, 0.3048, "converted to meters")):
             run_import(path, meters=meters)
             assert told in capfd.readouterr().out
             bpy.ops.meshfree.export_points(filepath=str(tmp_path / "a.xyz"), attributes="NONE")
