@@ -88,14 +88,14 @@ def test_only_what_is_seen_stays_selected(scan):
     through = scan.python(CHOSEN)
     scan.key("alt+z")
     scan.search("Select on Surface")
-    scan.wait_until(f"{CHOSEN} < {through}")
+    scan.wait_for(lambda: scan.python(CHOSEN) < through, "points behind are not selected")
     finish(scan)
     assert scan.python(CHOSEN) == pytest.approx(through / 2, rel=0.05)
     assert max(place[1] for place in scan.python(PLACES)) < 0.0
     assert scan.python(EDITING)
 
 
-@pytest.mark.parametrize("opened", [("MESHFREE_PT_points",)], indirect=True)
+@pytest.mark.parametrize("opened", [("MESHFREE_PT_select",)], indirect=True)
 def test_clipped_to_a_box(opened):  # noqa: F811
     gui = opened
     gui.python(f"import bmesh\n{SCAN}")
@@ -113,7 +113,7 @@ def test_clipped_to_a_box(opened):  # noqa: F811
     gui.point_at_view()
     gui.key("b")
     gui.drag(*ends)
-    gui.wait_until(f"{CHOSEN} > 100")
+    gui.wait_for(lambda: gui.python(CHOSEN) > 100, "points are selected")
     assert max(place[0] for place in gui.python(PLACES)) < 0.01
     gui.press("view3d.clip_border")
     gui.wait_for(lambda: shares(gui, 0.1, 0.4)[0] > 0.9, "all is there again")

@@ -71,13 +71,14 @@ def test_a_deleted_object_goes(gui):
     gui.wait_until("bpy.data.objects['Cloud'].meshfree.compared_with == bpy.data.objects['Other']")
 
 
-@pytest.mark.parametrize("opened", ["MESHFREE_PT_points"], indirect=True)
+@pytest.mark.parametrize("opened", ["MESHFREE_PT_display"], indirect=True)
 def test_group_colors_give_the_shading_back(opened):  # noqa: F811
     gui = opened
     shading(gui, "SOLID")
-    gui.press(".meshfree.show_groups")
+    gui.open_panel(".meshfree.show_groups")
+    gui.press(".meshfree.show_groups", across=0.6)
     gui.wait_until(f"{SHADING} == 'MATERIAL'")
-    gui.press(".meshfree.show_groups")
+    gui.press(".meshfree.show_groups", across=0.6)
     gui.wait_until(f"{SHADING} == 'SOLID'")
 
 
