@@ -193,7 +193,7 @@ def _box(gui, *corners):
 
 def _find(gui, press, button):
     """Press a button of the panel, or open a panel there, wherever one has to scroll to."""
-    for steps in (0, -60, 12, 12, 12, 12, 12):
+    for steps in (0, 60, -120, 12, 12, 12, 12, 12):  # here, at the end, and from the top
         gui.scroll(steps)
         try:
             return press(button)
