@@ -14,13 +14,12 @@ import gpu
 import numpy as np
 from bpy.app.handlers import persistent
 
-from ..command.colors import of_splats
 from ..operators.objects.attributes import DISC, has_vectors, read_attribute
-from ..operators.objects.colors import is_color, own_colors
+from ..operators.objects.colors import is_color, own_colors, splat_colors
 from ..operators.objects.handlers import add_handlers, remove_handlers
 from ..operators.objects.modifiers import get_input
-from ..operators.objects.splats import BASE, has_splats
-from ..operators.tools.select import sees_through
+from ..operators.objects.splats import has_splats
+from ..operators.tools.select import sees_through, selected_now
 from . import colormaps, solid
 from .display import component, find_display, is_cloud, is_texture, numbers, shown_attribute
 from .materials import CHECKER, CHECKS, DIM
@@ -153,7 +152,7 @@ def _colors(obj, mesh):
         name = own_colors(mesh)
     if not name:
         if has_splats(mesh):
-            colors[:] = of_splats(read_attribute(mesh, BASE))
+            colors[:] = splat_colors(mesh)
         return colors
     if is_color(mesh, name):
         mesh.attributes[name].data.foreach_get("color", colors.reshape(-1))
@@ -188,12 +187,6 @@ def _in_groups(obj, mesh, colors):
     )
     rank = np.fromiter(held, np.int64, count=len(colors))
     colors[rank >= 0] = palette[rank[rank >= 0]]
-
-
-def selected_points(obj):
-    """Read which points of an object are selected in Edit Mode, (n,) bool."""
-    points = bmesh.from_edit_mesh(obj.data).verts
-    return np.fromiter((point.select for point in points), bool, count=len(points))
 
 
 @persistent
@@ -257,7 +250,7 @@ def _draw_object(context, obj):
         return
     if kept.batch is None:
         kept.batch = gpu.types.GPUBatch(type="POINTS", buf=kept.points)
-        chosen = selected_points(obj)[kept.shown].astype(np.float32)
+        chosen = selected_now(obj)[kept.shown].astype(np.float32)
         kept.batch.vertbuf_add(_buffer({"chosen": chosen}))
     shader = _shader()
     shader.bind()

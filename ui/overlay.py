@@ -163,22 +163,25 @@ def in_view(context, obj):
     left, bottom, right, top = _free_room(context.area, context.region)
     room = left + gap, bottom + gap, right, top
     sizes = [(scale * picture.width + gap, scale * picture.height + gap) for picture in found]
-    if not found or not found[0].movable:
-        return list(zip(found, arrange(sizes, *room, indent=scale * _GIZMOS), strict=True)), None
-    shares, placed = tuple(obj.meshfree.legend_place), Placed(room, sizes[0])
-    if shares != _CORNER:
-        return list(
-            zip(found, [placed.corner(shares), *arrange(sizes[1:], *room, scale * _GIZMOS)], strict=True)
-        ), placed
-    corners = arrange(sizes, *room, scale * _GIZMOS)
-    if corners[0] is not None:
-        (width, height), (left, bottom, right, top) = sizes[0], room
-        free = [(left, bottom), (left, top - scale * _TEXTS - height), (right - scale * _GIZMOS - width, top - height)]
-        there = [corners[0], *(corner for corner in free if corner[0] >= left and corner[1] >= bottom)]
-        known, region = seen_places(context, obj), context.region.as_pointer()
-        _chosen[region] = least_covering(there, sizes[0], known, _chosen.get(region, 0))
-        corners[0] = there[_chosen[region]]
+    placed = Placed(room, sizes[0]) if found and found[0].movable else None
+    shares, indent = tuple(obj.meshfree.legend_place), scale * _GIZMOS
+    if placed is not None and shares != _CORNER:
+        corners = [placed.corner(shares), *arrange(sizes[1:], *room, indent)]
+    else:
+        corners = arrange(sizes, *room, indent)
+        if placed is not None and corners[0] is not None:
+            corners[0] = _clear_corner(context, obj, placed, corners[0], scale)
     return list(zip(found, corners, strict=True)), placed
+
+
+def _clear_corner(context, obj, placed, usual, scale):
+    """Return where a legend covers least of an object: at its usual corner, or at one of the others."""
+    (width, height), (left, bottom, right, top) = placed.size, placed.room
+    free = [(left, bottom), (left, top - scale * _TEXTS - height), (right - scale * _GIZMOS - width, top - height)]
+    there = [usual, *(corner for corner in free if corner[0] >= left and corner[1] >= bottom)]
+    region = context.region.as_pointer()
+    _chosen[region] = least_covering(there, placed.size, seen_places(context, obj), _chosen.get(region, 0))
+    return there[_chosen[region]]
 
 
 def seen_places(context, obj):

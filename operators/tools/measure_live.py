@@ -10,7 +10,6 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from time import perf_counter
 
-import bmesh
 import bpy
 import numpy as np
 from bpy.app.handlers import persistent
@@ -26,7 +25,7 @@ from ..registration import Registration, Row
 from ..running.job import Job
 from ..running.ready import TROUBLES, error_text
 from .measuring import Figure, left_out, measured, volume_base
-from .select import SelectionOperator, analyzed, selection
+from .select import SelectionOperator, analyzed, selected_now
 
 _REST = 0.2  # seconds without a change after which the selection is measured
 _TICK = 0.05  # seconds between two looks at the thread
@@ -201,7 +200,7 @@ def _look(known, obj):
     """Begin to measure the selection of an object, unless the figures are of it."""
     try:
         _check_unchanged(known, obj)
-        chosen, kept = _selected_now(obj), obj.meshfree
+        chosen, kept = selected_now(obj), obj.meshfree
         with _quietly() if kept.volume_over == "POINTS" else nullcontext():  # which reads another object
             base = volume_base(bpy.context, obj)
         seen = zlib.crc32(chosen), kept.volume_over, kept.volume_plane, repr(base and base._replace(ground=None))
@@ -251,14 +250,6 @@ def _check_unchanged(known, obj):
     ):
         known.moved = True  # until it is as it was
         raise PointCloudError(_CHANGED)
-
-
-def _selected_now(obj):
-    """Read which points are selected in Edit Mode, (n,) bool."""
-    if obj.type != "MESH":
-        return selection(obj)
-    points = bmesh.from_edit_mesh(obj.data).verts
-    return np.fromiter((point.select for point in points), bool, count=len(points))
 
 
 def _halt(known):

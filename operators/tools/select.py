@@ -148,6 +148,14 @@ def selection(obj):
     return chosen
 
 
+def selected_now(obj):
+    """Read which points are selected in Edit Mode, (n,) bool."""
+    if obj.type != "MESH":
+        return selection(obj)
+    points = bmesh.from_edit_mesh(obj.data).verts
+    return np.fromiter((point.select for point in points), bool, count=len(points))
+
+
 def selected(obj):
     """Read which points are selected, (n,) bool; at least one is."""
     chosen = selection(obj)
