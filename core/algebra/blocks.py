@@ -4,11 +4,15 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
+import numpy as np
+
 from ..cores import cores
-from ..types import Report
+from ..types import Array, Report
 
 Part = TypeVar("Part")
 Result = TypeVar("Result")
+
+_BLOCK = 1 << 13  # rows of a few numbers, or of some dozens
 
 
 def blocks(count: int, size: int) -> list[slice]:
@@ -45,3 +49,8 @@ def on_all_cores(
             results.append(result)
             report()
     return results
+
+
+def by_blocks(function: Callable[[slice], Array], count: int) -> Array:
+    """Return the array, (count, ...), of which a function computes the rows of each slice, on all cores."""
+    return np.concatenate(on_all_cores(function, blocks(count, _BLOCK) or [slice(0)]))

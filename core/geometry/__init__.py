@@ -37,7 +37,6 @@ from .nearest import (
     fading_weights,
     find_nearest,
     nearest_rows,
-    repeated,
     spacing_of,
     typical_distance,
 )

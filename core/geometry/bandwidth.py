@@ -11,7 +11,7 @@ from .agreed import Decisions
 from .boundary import Boundary
 from .cells import Cells
 from .moments import MET, least_error
-from .nearest import ENOUGH, GAP, POWER, ROUNDS, Nearest, repeated
+from .nearest import ENOUGH, GAP, POWER, ROUNDS, Nearest
 from .quadrics import Quadrics
 
 _NARROWEST = 1.08  # h over the radius of the cells
@@ -63,7 +63,7 @@ def smoothing_lengths(
     """
     if options.bandwidth == "adaptive":
         lengths = options.bandwidth_factor * _NARROWEST * mean_gaps(nearest, cells.radius, POWER)
-        cell = repeated(nearest.averaging(), cells.areas, ROUNDS)
+        cell = nearest.averaged(cells.areas, ROUNDS)
         lengths = np.maximum(lengths, options.bandwidth_factor * np.sqrt(ENOUGH / np.pi * cell) / SUPPORT)
         return lengths * _widening(nearest, normals, quadrics, cells, boundary, lengths)
     if options.bandwidth == "global":
@@ -72,7 +72,7 @@ def smoothing_lengths(
         )
         return np.full(len(normals), options.bandwidth_factor * found)
     distance = neighbor_distance(nearest.tree, options.neighbors, component)
-    return options.bandwidth_factor * repeated(nearest.averaging(), distance, 2)
+    return options.bandwidth_factor * nearest.averaged(distance, 2)
 
 
 def _widening(
@@ -88,8 +88,9 @@ def _widening(
     def error(rows: Ints, factor: float) -> Floats:
         return least_error(nearest, normals, cells.areas, boundary, factor * lengths, rows) + factor**2 * bend[rows]
 
-    averaging = nearest.averaging()
-    bend = _BENT * lengths**2 * (averaging @ np.einsum("iab,iab->i", quadrics.shape_operator, quadrics.shape_operator))
+    bend = (
+        _BENT * lengths**2 * nearest.averaged(np.einsum("iab,iab->i", quadrics.shape_operator, quadrics.shape_operator))
+    )
     rows, result, factor = np.arange(len(lengths)), np.ones(len(lengths)), 1.0
     least = error(rows, factor)
     while len(rows):
@@ -100,7 +101,7 @@ def _widening(
         better = found < least
         rows, least = rows[better], found[better]
         result[rows] = factor
-    return (averaging @ result**POWER) ** (1.0 / POWER)
+    return nearest.averaged(result**POWER) ** (1.0 / POWER)
 
 
 def mean_gaps(nearest: Nearest, radius: Floats, power: int) -> Floats:
@@ -116,7 +117,7 @@ def mean_gaps(nearest: Nearest, radius: Floats, power: int) -> Floats:
         Of the mean: in the eighth the widest gaps decide.
     """
     radius = np.minimum(radius, GAP * nearest.spacing)
-    return repeated(nearest.averaging(), radius**power, ROUNDS) ** (1.0 / power)
+    return nearest.averaged(radius**power, ROUNDS) ** (1.0 / power)
 
 
 def depth(nearest: Nearest, inside: Floats) -> Floats:

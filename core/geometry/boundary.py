@@ -75,7 +75,8 @@ class Boundary:
         ndarray, (k,) int
             Which of the pairs.
         """
-        rows = np.flatnonzero(np.isfinite(np.minimum(self.distance[first, 0], self.distance[second, 0])))
+        near = np.isfinite(self.distance[:, 0])
+        rows = np.flatnonzero(near[first] | near[second]) if near.any() else np.zeros(0, dtype=int)
         chord = tree.data[second[rows]] - tree.data[first[rows]]
         length = np.linalg.norm(chord, axis=1)
         near = np.minimum(self.distance[first[rows], 0], self.distance[second[rows], 0]) < 0.5 * length

@@ -4,6 +4,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
+from ..algebra import by_blocks
 from ..types import Bools, Floats, Ints
 from .nearest import COUNT, NEXT, Nearest
 
@@ -73,9 +74,14 @@ def label_connected(index: Ints, joined: Bools) -> Ints:
     label = np.arange(len(index), dtype=np.int32)
     # By the nearest neighbors first, for speed: hardly any other edge still joins two components then.
     for some in (slice(0, NEXT), slice(NEXT, None)):
-        row, column = np.nonzero(joined[:, some] & (label[index[:, some]] != label[:, None]))
-        ends = label[row], label[index[row, some.start + column]]
-        graph = sparse.csr_array((np.ones(len(row), dtype=bool), ends), shape=(label.max() + 1,) * 2)
+
+        def across(rows: slice, some: slice = some, label: Ints = label) -> Ints:
+            other = label[index[rows, some]]
+            row, column = np.nonzero(joined[rows, some] & (other != label[rows, None]))
+            return np.stack([label[rows][row], other[row, column]], axis=1)
+
+        ends = tuple(by_blocks(across, len(index)).T)
+        graph = sparse.csr_array((np.ones(len(ends[0]), dtype=bool), ends), shape=(label.max() + 1,) * 2)
         label = connected_components(graph, directed=False)[1][label]
     return label
 

@@ -3,6 +3,7 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..algebra import by_blocks
 from ..cores import cores
 from ..types import Bools, Floats, Ints
 from .cells import Cells
@@ -73,10 +74,14 @@ def _on_one_side(nearest: Nearest, places: Floats, axes: Floats) -> Bools:
     """Tell of which places, (k, 3), in planes by their axes, (k, 3, 2), all points near by lie on one side, (k,)."""
     some = range(1, min(ENOUGH, len(nearest.points)) + 1)
     index = nearest.tree.query(places, k=some, workers=cores())[1]
-    x, y = np.einsum("ikc,ica->aik", nearest.points[index] - places[:, None], axes)
-    angle = np.sort(np.arctan2(y, x), axis=1)
-    gaps = np.diff(np.concatenate([angle, angle[:, :1] + 2.0 * np.pi], axis=1), axis=1)
-    return np.asarray(gaps.max(axis=1) > np.pi)
+
+    def on_one_side(rows: slice) -> Bools:
+        x, y = np.einsum("ikc,ica->aik", nearest.points[index[rows]] - places[rows, None], axes[rows])
+        angle = np.sort(np.arctan2(y, x), axis=1)
+        gaps = np.diff(np.concatenate([angle, angle[:, :1] + 2.0 * np.pi], axis=1), axis=1)
+        return np.asarray(gaps.max(axis=1) > np.pi)
+
+    return by_blocks(on_one_side, len(places))
 
 
 def _take_over(radii: Floats, spacing: Floats, points: Floats, places: Floats, other: Ints) -> None:

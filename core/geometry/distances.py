@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..algebra import by_blocks
 from ..types import Floats, Ints
 from .nearest import AGREEING, NEXT, SMOOTH, Nearest
 from .quadrics import chords, gathered
@@ -92,15 +93,18 @@ def measure_squared_slope(nearest: Nearest, normals: Floats) -> Floats:
         averaged over the neighborhood. Of fourth order in the spacing on a smooth surface. Sharp edges, where normals
         change too fast between neighbors to be right, do not count: arcs make up for them already.
     """
-    near = slice(1, NEXT + 1)
-    index, counted = nearest.index[:, near], nearest.weight[:, near] > 0.0
-    rows = np.arange(len(index))
-    cosine, left, right = heights_of_ends(chords(nearest.points, rows, index), normals, rows, index)
-    height = left + np.where(cosine < 0.0, -right, right)
-    across = counted & (np.abs(cosine) < SMOOTH)
-    smooth = counted & ~across & (across.sum(axis=1) < AGREEING)[:, None]
-    slope = np.where(smooth, (0.5 * height / nearest.distance[:, near]) ** 2, 0.0)
-    return nearest.averaging() @ (slope.sum(axis=1) / np.maximum(counted.sum(axis=1), 1))
+
+    def measure(part: slice) -> Floats:
+        rows, near = np.arange(part.start, part.stop), (part, slice(1, NEXT + 1))
+        index, counted = nearest.index[near], nearest.weight[near] > 0.0
+        cosine, left, right = heights_of_ends(chords(nearest.points, rows, index), normals, rows, index)
+        height = left + np.where(cosine < 0.0, -right, right)
+        across = counted & (np.abs(cosine) < SMOOTH)
+        smooth = counted & ~across & (across.sum(axis=1) < AGREEING)[:, None]
+        slope = np.where(smooth, (0.5 * height / nearest.distance[near]) ** 2, 0.0)
+        return slope.sum(axis=1) / np.maximum(counted.sum(axis=1), 1)
+
+    return nearest.averaged(by_blocks(measure, len(normals)))
 
 
 def heights_of_ends(chord: Floats, normals: Floats, rows: Ints, other: Ints) -> tuple[Floats, Floats, Floats]:

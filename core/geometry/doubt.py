@@ -7,7 +7,7 @@ import numpy as np
 
 from ..types import Array, Floats, Ints
 from .cells import Cells
-from .nearest import ON, ROUNDS, Nearest, fading_weights, repeated
+from .nearest import ON, ROUNDS, Nearest, fading_weights
 from .noise import FILLING
 
 _OWN = 0.5  # two sheets: the residual of the own sheet's fit is at most this share of the mixed fit's
@@ -90,7 +90,7 @@ def likely_causes(nearest: Nearest, normals: Floats, cells: Cells, scatter: Floa
     missed, own = scatter
     filling = missed > FILLING
     smooth = filling & (_agreement(nearest, normals) > _AGREED) if filling.any() else filling
-    slender = np.exp(nearest.averaging() @ np.log(np.pi * cells.radius**2 / cells.areas))
+    slender = np.exp(nearest.averaged(np.log(np.pi * cells.radius**2 / cells.areas)))
     return np.select(
         [(missed > ON) & (own < _OWN * missed), smooth, filling, slender > _LONG],
         [Doubt.SHEETS, Doubt.NOISE, Doubt.VOLUME, Doubt.ROWS],
@@ -100,8 +100,8 @@ def likely_causes(nearest: Nearest, normals: Floats, cells: Cells, scatter: Floa
 
 def _agreement(nearest: Nearest, normals: Floats) -> Floats:
     """Return the mean squared cosine of the normals around every point to the direction that they agree with most."""
-    averaging = replace(nearest, weight=fading_weights(nearest.distance)).averaging()  # over all sheets
+    everywhere = replace(nearest, weight=fading_weights(nearest.distance))  # over all sheets
     products = np.einsum("ia,ib->iab", normals, normals).reshape(-1, 9)
-    products = repeated(averaging, products, ROUNDS // 2)
+    products = everywhere.averaged(products, ROUNDS // 2)
     largest: Array = np.linalg.eigvalsh(products.reshape(-1, 3, 3))[:, 2]
     return largest

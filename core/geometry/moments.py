@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from ..algebra import blocks, eliminate, on_all_cores
@@ -24,10 +26,14 @@ class EdgeTerms:
     """The terms of points next to boundaries, where the images make all functions even across them."""
 
     def __init__(self, boundary: Boundary, lengths: Floats, tangents: Floats) -> None:
-        across = np.einsum("tci,isc->sti", tangents, boundary.outward)
-        self._across = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
+        self._tangents, self._outward = tangents, boundary.outward
         self._inside = np.minimum(boundary.distance / lengths[:, None], SUPPORT).T
         self._corner = self._inside[1] < SUPPORT
+
+    @functools.cached_property
+    def _across(self) -> Floats:
+        across = np.einsum("tci,isc->sti", self._tangents, self._outward)
+        return across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
 
     def terms(self, rows: Ints, x: Floats, y: Floats) -> tuple[Floats, ...]:
         """Return the terms of the offsets (x, y) from some points, (5, k).

@@ -9,6 +9,7 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
+from ..algebra import by_blocks
 from ..cores import cores
 from ..types import Bools, Floats, Ints
 from .quadrics import Quadrics, chords, covariance, fit_quadrics, roundness
@@ -88,8 +89,12 @@ class Nearest:
         """Tell of which of some points, (k,) int, the nearest eight neighbors lie along a row, (k,) bool."""
         index = self.index[rows, : NEXT + 1]
         even = np.full(index.shape, 1.0 / index.shape[1])
-        lined: Bools = roundness(np.linalg.eigvalsh(covariance(chords(self.points, rows, index), even))) < ROW
-        return lined
+
+        def lined(part: slice) -> Bools:
+            spread = covariance(chords(self.points, rows[part], index[part]), even[part])
+            return roundness(np.linalg.eigvalsh(spread)) < ROW
+
+        return by_blocks(lined, len(rows))
 
     @functools.cached_property
     def beside_rows(self) -> Bools:
@@ -129,19 +134,25 @@ class Nearest:
         fitted = fit_quadrics(points, index[rows], result.weight[rows], rows)
         return result.with_quadrics(self.quadrics.take(np.flatnonzero(kept)).put(rows, fitted))
 
-    def averaging(self) -> sparse.csr_array:
-        """Return the (m, m) CSR matrix whose product is the weighted mean over the neighbors."""
+    def averaged(self, values: Floats, rounds: int = 1) -> Floats:
+        """Return quantities of points, (m, ...), after so many rounds of weighted means over the neighbors."""
         count, width = self.index.shape
-        weight = self.weight / self.weight.sum(axis=1, keepdims=True)
-        start = np.arange(0, count * width + 1, width, dtype=np.int32)
-        return sparse.csr_array((weight.ravel(), self.index.ravel(), start), shape=(count, count))
 
+        def mean(rows: slice) -> Floats:
+            part = sparse.csr_array((rows.stop - rows.start, count))
+            # Set afterwards, for the constructor would copy a slice of an array.
+            part.data, part.indices = self.weight[rows].ravel(), self.index[rows].ravel()
+            part.indptr = np.arange(0, part.data.size + 1, width, dtype=np.int32)
+            result: Floats = ((part @ values).T / self._total[rows]).T
+            return result
 
-def repeated(averaging: sparse.csr_array, values: Floats, rounds: int) -> Floats:
-    """Return quantities of points, (m, ...), after so many products with a matrix of means."""
-    for _ in range(rounds):
-        values = averaging @ values
-    return values
+        for _ in range(rounds):
+            values = by_blocks(mean, count)
+        return values
+
+    @functools.cached_property
+    def _total(self) -> Floats:
+        return by_blocks(lambda rows: self.weight[rows].sum(axis=1), len(self.weight))
 
 
 def find_nearest(points: Floats) -> Nearest:
@@ -163,13 +174,17 @@ def fading_weights(distance: Floats) -> Floats:
     Which of several neighbors at the same last distance was found then makes no difference. Only where nearly all of
     them are that far, such as around the pole of circles of latitude, all count alike.
     """
-    weights = distance / distance[:, -1:]
-    weights *= weights
-    np.subtract(1.0, weights, out=weights)
-    weights *= weights
-    tied = weights[:, 1:].sum(axis=1) < 1.0
-    weights[tied] = 1.0
-    return weights
+
+    def weigh(rows: slice) -> Floats:
+        weights = distance[rows] / distance[rows, -1:]
+        weights *= weights
+        np.subtract(1.0, weights, out=weights)
+        weights *= weights
+        tied = weights[:, 1:].sum(axis=1) < 1.0
+        weights[tied] = 1.0
+        return weights
+
+    return by_blocks(weigh, len(distance))
 
 
 def typical_distance(positions: Floats) -> float:

@@ -5,7 +5,7 @@ from scipy.spatial import cKDTree
 
 from ..algebra import blocks, on_all_cores
 from ..types import Floats, Ints
-from .nearest import COUNT, ENOUGH, ROUNDS, Nearest, fading_weights, repeated
+from .nearest import COUNT, ENOUGH, ROUNDS, Nearest, fading_weights
 from .quadrics import fit_quadrics
 
 _SHAPE = 1.6  # residual of a fit to 40 over that to 20, from which it is shape: noise leaves both alike
@@ -39,9 +39,8 @@ def mean_misfits(nearest: Nearest, *misfits: Floats) -> Floats:
     ndarray, (k, m)
         Of the k given ones. An edge that runs through a neighborhood has little weight.
     """
-    averaging = nearest.averaging()
     logarithms = np.log(np.maximum(np.stack(misfits, axis=1) / nearest.spacing[:, None], 1e-12))
-    means: Floats = np.exp(repeated(averaging, logarithms, ROUNDS // 2).T)
+    means: Floats = np.exp(nearest.averaged(logarithms, ROUNDS // 2).T)
     return means
 
 
@@ -66,7 +65,7 @@ def noise_level(nearest: Nearest, near: Floats, mixed: Floats, misfit: Floats) -
     """
     few, many, own = mean_misfits(nearest, near, mixed, misfit)
     noisy = (few > _LEAST) & (few < _SHAPE * own) & ((few > FILLING) | (many < _SHAPE * few))
-    return np.where(nearest.averaging() @ noisy.astype(float) > 0.5, few, 0.0)
+    return np.where(nearest.averaged(noisy.astype(float)) > 0.5, few, 0.0)
 
 
 def project_points(tree: cKDTree, rows: Ints, noise: Floats, smallest: int | None = None) -> Floats:

@@ -5,6 +5,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
 
+from ..algebra import by_blocks
 from ..arguments import as_array, as_doubles
 from ..errors import InvalidPointsError
 from ..types import Array, Bools, Floats, Ints
@@ -183,8 +184,12 @@ def near_edges(nearest: Nearest) -> tuple[Ints, Ints]:
 
 def mirrored_cosine(points: Floats, normals: Floats, first: Ints, second: Ints) -> Floats:
     """Cosine between the second normal and the mirror image of the first in the plane halfway between the points."""
-    chord = points[second] - points[first]
-    chord /= np.linalg.norm(chord, axis=1)[:, None]
-    left, right = normals[first], normals[second]
-    along = np.einsum("ij,ij->i", chord, left) * np.einsum("ij,ij->i", chord, right)
-    return np.einsum("ij,ij->i", left, right) - 2.0 * along
+
+    def measure(part: slice) -> Floats:
+        chord = points[second[part]] - points[first[part]]
+        chord /= np.linalg.norm(chord, axis=1)[:, None]
+        left, right = normals[first[part]], normals[second[part]]
+        along = np.einsum("ij,ij->i", chord, left) * np.einsum("ij,ij->i", chord, right)
+        return np.einsum("ij,ij->i", left, right) - 2.0 * along
+
+    return by_blocks(measure, len(first))

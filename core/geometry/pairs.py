@@ -9,16 +9,17 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from ..algebra import on_all_cores
+from ..algebra import blocks, on_all_cores
 from ..cores import cores
 from ..kernel import SUPPORT
 from ..types import Array, Bools, Floats, Ints, Report
-from .nearest import COUNT, Nearest
+from .nearest import Nearest
 from .patches import Patch, divide_pairs
 
 Ends: TypeAlias = Sequence[Sequence[Floats]] | Floats  # quantities of pairs at their first and second points
 
-_BLOCK = 1 << 22  # neighbor candidates held at one time while the pairs are collected
+_BLOCK = 1 << 19  # neighbor candidates that a core looks at at one time while the pairs are collected
+_NEAR = 1 << 13  # points whose known neighbors are looked at at one time
 _GROUPS = 4  # groups of points by their number of candidates, for each doubling of it
 
 
@@ -131,24 +132,32 @@ def find_pairs(
     if nearest is not None:
         known = (radii < nearest.distance[:, -1]) & ~nearest.in_row
         open_ = np.flatnonzero(~known)
-        for rows in np.array_split(np.flatnonzero(known), tree.n * COUNT // _BLOCK + 1):
-            report()
-            keep(rows, nearest.distance[rows], nearest.index[rows])
+        rows = np.flatnonzero(known)
+        near = [rows[part] for part in blocks(len(rows), _NEAR)]
+        on_all_cores(lambda rows: keep(rows, nearest.distance[rows], nearest.index[rows]), near, report)
     # Counting is cheap. Points with about as many candidates are then queried together, for hardly more than they have.
     count = tree.query_ball_point(tree.data[open_], radii[open_], workers=cores(), return_length=True)
     group = np.ceil(np.log2(count) * _GROUPS).astype(np.int16)
     order = np.argsort(group, kind="stable")
     groups = np.split(order, np.flatnonzero(np.diff(group[order])) + 1) if len(order) else []
+
+    def search(part: tuple[Ints, int]) -> None:
+        rows, most = part
+        keep(rows, *tree.query(tree.data[rows], k=np.arange(1, most + 1)))
+
+    parts = []
     for members in groups:
         most = int(count[members].max())
-        for rows in np.array_split(open_[members], len(members) * most // _BLOCK + 1):
-            report()
-            keep(rows, *tree.query(tree.data[rows], k=np.arange(1, most + 1), workers=cores()))
+        parts += [(rows, most) for rows in np.array_split(open_[members], len(members) * most // _BLOCK + 1)]
+    on_all_cores(search, parts, report)
     start = np.cumsum(many) - many
     first = np.repeat(np.arange(tree.n, dtype=np.int32), many)
     second, distance = np.empty(len(first), dtype=np.int32), np.empty(len(first))
-    while found:
-        owner, column, length = found.pop()
+
+    def put(part: tuple[Ints, Ints, Floats]) -> None:
+        owner, column, length = part
         place = np.arange(len(column)) + np.repeat(start[owner] - np.cumsum(many[owner]) + many[owner], many[owner])
         second[place], distance[place] = column, length
+
+    on_all_cores(put, found)
     return [first, second, distance]

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from ..geometry import repeated
 from ..types import Array, Floats
 from .laplacian import LaplaceBeltrami
 
@@ -76,7 +75,7 @@ class Averages:
         """Return values, (n, ...), after each number of averages in `ROUNDS`; values of the other side negated."""
         shape, result = values.shape, [values.reshape(len(values), -1)]
         for before, after in itertools.pairwise(ROUNDS):
-            result.append(repeated(self._pairs, result[-1], after - before))
+            result.append(_repeated(self._pairs, result[-1], after - before))
         return [each.reshape(shape) for each in result]
 
     def settle(self, averaged: list[Floats]) -> Settled:
@@ -107,7 +106,14 @@ class Averages:
         return self._around((values**2).sum(axis=1), rounds)
 
     def _around(self, values: Floats, rounds: int = 2) -> Floats:
-        return repeated(self._window, values, rounds)
+        return _repeated(self._window, values, rounds)
+
+
+def _repeated(averaging: sparse.csr_array, values: Floats, rounds: int) -> Floats:
+    """Return quantities of points, (m, ...), after so many products with a matrix of means."""
+    for _ in range(rounds):
+        values = averaging @ values
+    return values
 
 
 def off_neighbors(laplacian: LaplaceBeltrami, values: Floats, rounds: int) -> Floats:

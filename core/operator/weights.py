@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..algebra import chebyshev_steps, inverses, on_all_cores
+from ..algebra import by_blocks, chebyshev_steps, eliminate, on_all_cores
 from ..geometry import LARGEST, MET, TERMS, Cloud, EdgeTerms, Patch, arc_ahead, dots, frames, put_terms
 from ..kernel import SECOND_MOMENT
 from ..types import Floats, Ints, Report
@@ -84,21 +84,29 @@ def balance_weights(
     rates = chebyshev_steps(slowest, _FASTEST)
     for number in range(_ROUNDS + 1):
         if number < 2:  # the first round, half a step, goes nearly all the way: later Jacobians differ little
-            found, curvature = moments.with_curvature(terms)
-            inverse = inverses(0.5 * curvature + MET * np.eye(TERMS))
+            found, inverse = moments.with_inverse(terms)
         else:
             found = moments.of(terms)
         missing = goal - found
         residual = np.linalg.norm(missing, axis=1)
-        met = residual < _SMALLEST
-        if number == _ROUNDS or met.all():
+        if number == _ROUNDS or residual.max() < _SMALLEST:
             break
         kept, rate = next(rates) if number else (0.0, 0.5)
-        step = kept * step + rate * np.einsum("iab,ib->ia", inverse, missing - MET * terms)
-        step /= np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1.0)
-        step[met] = 0.0
+        step = _next_step(step, kept, rate, inverse, missing - MET * terms)
+        step[residual < _SMALLEST] = 0.0
         terms += step
     return Balance(moments.factor, residual)
+
+
+def _next_step(before: Floats, kept: float, rate: float, inverse: Floats, gradient: Floats) -> Floats:
+    """Return the steps of the coefficients of points, (m, 5), from those before, of length one at most."""
+
+    def change(rows: slice) -> Floats:
+        step = kept * before[rows] + rate * np.einsum("iab,ib->ia", inverse[rows], gradient[rows])
+        step /= np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1.0)
+        return step
+
+    return by_blocks(change, len(before))
 
 
 def _trace(cloud: Cloud, weights: Floats, areas: Floats) -> Floats:
@@ -170,8 +178,8 @@ class _Moments:
 
         return self._sums(weighted, TERMS)
 
-    def with_curvature(self, terms: Floats) -> tuple[Floats, Floats]:
-        """Return the moments, and the Hessian of the entropy by the coefficients of each point, (m, 5, 5)."""
+    def with_inverse(self, terms: Floats) -> tuple[Floats, Floats]:
+        """Return the moments, and the inverse Hessian of the entropy by the coefficients of each point, (m, 5, 5)."""
         places, terms = [(i, j) for i in range(TERMS) for j in range(i + 1)], terms.T.copy()
 
         def products(patch: Patch) -> list[list[Floats]]:
@@ -182,9 +190,14 @@ class _Moments:
 
         left, right = np.transpose(places)
         sums = self._sums(products, TERMS + len(places))
-        curvature = np.empty((len(sums), TERMS, TERMS))
-        curvature[:, left, right] = curvature[:, right, left] = sums[:, TERMS:]
-        return sums[:, :TERMS], curvature
+
+        def invert(rows: slice) -> Floats:
+            curvature = np.empty((TERMS, TERMS, rows.stop - rows.start))
+            curvature[left, right] = curvature[right, left] = 0.5 * sums[rows, TERMS:].T
+            curvature[range(TERMS), range(TERMS)] += MET
+            return np.moveaxis(eliminate(curvature), -1, 0)
+
+        return sums[:, :TERMS], by_blocks(invert, len(sums))
 
     def _sums(self, values: Callable[[Patch], Any], count: int) -> Floats:
         """Return the sums of quantities of pairs at both ends, in the unit, (m, count)."""
