@@ -8,9 +8,11 @@ from typing import Any, TypeVar
 import numpy as np
 from scipy import sparse
 
+from ..cores import cores
 from ..types import Array, Report
 
-PART = 1 << 20  # entries of a matrix that are multiplied at once: some hundredths of a second
+PART = 1 << 20  # entries of a matrix that are multiplied at once, at most: some hundredths of a second
+_LEAST = 1 << 17  # and at least, unless these are all: fewer are multiplied before another thread has started
 
 Result = TypeVar("Result")
 
@@ -29,7 +31,8 @@ class Rows:
 
     def __init__(self, matrix: sparse.csr_array, pool: ThreadPoolExecutor, report: Report) -> None:
         self._map, self._report, self._count, self._dtype = pool.map, report, matrix.shape[0], matrix.dtype
-        starts = np.append(np.arange(0, max(matrix.nnz, 1), PART), matrix.nnz)
+        size = min(max(matrix.nnz // cores() + 1, _LEAST), PART)
+        starts = np.append(np.arange(0, max(matrix.nnz, 1), size), matrix.nnz)
         cuts = np.unique(np.append(np.searchsorted(matrix.indptr[:-1], starts[:-1]), matrix.shape[0]))
         self._slices = [slice(first, last) for first, last in pairwise(cuts)]
         self._parts = []
