@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from . import analysis, clouds, core, quantities
 from .inputs import add_choices, files_in, las_choices
@@ -16,6 +18,24 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from tools.tool import Array, Progress
+
+Printed: TypeAlias = "tuple[dict[str, Any], list[str]]"  # figures by name, and notices
+
+
+@dataclass(frozen=True)
+class Task:
+    """One input of a verb, and where its results go."""
+
+    path: Path
+    given: clouds.Given
+    arguments: Namespace  # with the settings of the object that was read, if any
+    output: Path | None
+    progress: Progress
+
+    @cached_property
+    def cloud(self) -> clouds.Cloud:
+        """Its points."""
+        return clouds.Cloud(self.path, self.given, floaters(self.arguments))
 
 
 class CloudVerb(Verb):
@@ -63,15 +83,13 @@ class CloudVerb(Verb):
         if kind is not None and given.owner is None:
             given = kind.own(path.stem, given, arguments)
         with ToldStages(self.name) as stages:
-            figures, notices = self.work(path, given, clouds.with_own(arguments, given), output, stages)
+            figures, notices = self.work(Task(path, given, clouds.with_own(arguments, given), output, stages))
         notices = [*given.notices, *notices]
         if kind is not None:
             given.owner.save(output, self.operator or self.name.replace("-", "_"), notices, stages.seconds)
         return {**figures, "seconds": stages.rounded, "notices": notices}
 
-    def work(
-        self, path: Path, given: clouds.Given, arguments: Namespace, output: Path | None, progress: Progress
-    ) -> tuple[dict[str, Any], list[str]]:
+    def work(self, task: Task) -> Printed:
         """Process points or splats, write the output, and return what to print, and notices."""
         raise NotImplementedError
 

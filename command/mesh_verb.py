@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import clouds, colors, core
+from .cloud_verb import Task
 from .tool_verb import ToolVerb
 
 if TYPE_CHECKING:
-    from argparse import ArgumentParser, Namespace
+    from argparse import ArgumentParser
     from pathlib import Path
 
-    from tools.tool import Array, Outcome, Progress
+    from tools.tool import Array, Outcome
 
 
 class MeshVerb(ToolVerb):
@@ -31,29 +32,19 @@ class MeshVerb(ToolVerb):
             told = "end the mesh where the points end; otherwise all openings are closed (default on)"
             parser.add_argument("--keep-open", action=argparse.BooleanOptionalAction, default=True, help=told)
 
-    def compute(
-        self,
-        cloud: clouds.Cloud,
-        laplacian: core.LaplaceBeltrami,
-        inputs: Any,
-        own: Any,
-        arguments: Namespace,
-        progress: Progress,
-    ) -> Any:
-        found = super().compute(cloud, laplacian, inputs, own, arguments, progress)
+    def compute(self, task: Task, subject: Any, inputs: Any, own: Any) -> Any:
+        found = super().compute(task, subject, inputs, own)
         for kind in clouds.kinds().values() if found.opened else ():
-            if not arguments.keep_open:
+            if not task.arguments.keep_open:
                 faces, opened = kind.close(found.mesh.vertices, found.faces)
                 found = found._replace(faces=faces, opened=opened)
         return found
 
-    def write(
-        self, output: Path, cloud: clouds.Cloud, outcome: Outcome, laplacian: core.LaplaceBeltrami, arguments: Namespace
-    ) -> list[str]:
-        faces, table = outcome.made.faces, _on_vertices(cloud, laplacian, outcome.made.mesh.vertices)
+    def write(self, output: Path, task: Task, outcome: Outcome, subject: Any) -> list[str]:
+        faces, table = outcome.made.faces, _on_vertices(task.cloud, subject, outcome.made.mesh.vertices)
         if clouds.kind_of(output) is None:
             return core.files.write_mesh(output, table, faces, double=not table.single)
-        cloud.owner.add_mesh(table, faces)
+        task.cloud.owner.add_mesh(table, faces)
         return []
 
 

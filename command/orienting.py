@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from . import analysis, clouds, core, quantities
+from .cloud_verb import Task
 from .settings import place
 from .tool_verb import ToolVerb
 
@@ -46,10 +47,8 @@ class OrientVerb(ToolVerb):
             if not missing:
                 arguments.method = method
 
-    def write(
-        self, output: Path, cloud: clouds.Cloud, outcome: Outcome, subject: Any, arguments: Namespace
-    ) -> list[str]:
+    def write(self, output: Path, task: Task, outcome: Outcome, subject: Any) -> list[str]:
         turned = subject.toward(outcome.values[quantities.ORIENTATION])
         values = analysis.Built(turned, core.measure.measure_mean_curvature(turned)).measures
         values[quantities.ORIENTATION] = values[quantities.NORMAL]
-        return super().write(output, cloud, outcome._replace(values=values), subject, arguments)
+        return super().write(output, task, outcome._replace(values=values), subject)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import clouds, colors, core, quantities, transferring
-from .cloud_verb import CloudVerb, SurfaceVerb, boundary_of, floaters
+from .cloud_verb import CloudVerb, Printed, SurfaceVerb, Task, boundary_of, floaters
 from .measures import add_base, base_of, check_base, volumes_over
 from .naming import naming
 from .results import number_text
@@ -67,10 +67,8 @@ class WithReference(CloudVerb):
         """Return the cloud of the reference, and arguments with its settings."""
         return self._target, self._own
 
-    def write(
-        self, output: Path, cloud: clouds.Cloud, outcome: Outcome, subject: Any, arguments: Namespace
-    ) -> list[str]:
-        given, target = cloud.given, self._target
+    def write(self, output: Path, task: Task, outcome: Outcome, subject: Any) -> list[str]:
+        given, cloud, target = task.given, task.cloud, self._target
         if outcome.matrix is not None:
             shifted = cloud.points + (cloud.place - target.place)
             given = clouds.moved(given, shifted, outcome.matrix, target.place)
@@ -116,26 +114,16 @@ class MeasureVerb(ReferenceVerb, ToolVerb):
     def check(self, parser: ArgumentParser, arguments: Namespace) -> None:
         check_base(parser, arguments)
 
-    def compute(
-        self,
-        cloud: clouds.Cloud,
-        laplacian: core.LaplaceBeltrami,
-        inputs: Any,
-        own: Any,
-        arguments: Namespace,
-        progress: Progress,
-    ) -> Any:
-        found, ground = super().compute(cloud, laplacian, inputs, own, arguments, progress), tuple[Any, ...]()
+    def compute(self, task: Task, subject: Any, inputs: Any, own: Any) -> Any:
+        found, ground = super().compute(task, subject, inputs, own), tuple[Any, ...]()
         if self._target is not None:
-            operator = self.laplacian(*self.reference(), progress)
+            operator = self.laplacian(*self.reference(), task.progress)
             ground = (lambda _: operator), self._target.place, self._target.path.name
-        base = base_of(arguments.plane, arguments.normal, cloud.place, *ground)
-        beside, told = volumes_over(laplacian, found.rows, inputs[0], base, progress)
+        base = base_of(task.arguments.plane, task.arguments.normal, task.cloud.place, *ground)
+        beside, told = volumes_over(subject, found.rows, inputs[0], base, task.progress)
         return found._replace(beside=beside, notices=[*found.notices, *told])
 
-    def write(
-        self, output: Path, cloud: clouds.Cloud, outcome: Outcome, laplacian: core.LaplaceBeltrami, arguments: Namespace
-    ) -> list[str]:
+    def write(self, output: Path, task: Task, outcome: Outcome, subject: Any) -> list[str]:
         write_rows(output, outcome.figures["parts"])
         return []
 
@@ -148,22 +136,20 @@ class TransferAttributes(ReferenceVerb):
     settings = (*transferring.MATCH.values(), *transferring.ATTRIBUTES.values())
     use = "points whose attributes are taken"
 
-    def work(
-        self, path: Path, given: clouds.Given, arguments: Namespace, output: Path | None, progress: Progress
-    ) -> tuple[dict[str, Any], list[str]]:
+    def work(self, task: Task) -> Printed:
+        cloud, arguments, progress = task.cloud, task.arguments, task.progress
         target, laplacian = self.reference()[0], self.laplacian(*self.reference(), progress)
         own, reference = SimpleNamespace(**chosen(self.settings, arguments)), arguments.reference
         arrays, left_out = _values(target, own)
-        cloud = clouds.Cloud(path, given, floaters(arguments))
         built = self.laplacian(cloud, arguments, progress)
         offsets = [target.place - cloud.place]
-        match = transferring.matched(built, [laplacian], offsets, own, path.stem, [reference], progress)
+        match = transferring.matched(built, [laplacian], offsets, own, task.path.stem, [reference], progress)
         smooth = [name for name, column in arrays.items() if _is_smooth(name, column)]
         new = transferring.taken(match, arrays, smooth, progress)
-        notices, line = transferring.told(match, transferring.counted(arrays), path.stem, reference, number_text)
+        notices, line = transferring.told(match, transferring.counted(arrays), task.path.stem, reference, number_text)
         told = [*target.notices, *transferring.left_out(left_out), *notices]
-        if output is not None:
-            told += _write_taken(output, cloud, new, match.state)
+        if task.output is not None:
+            told += _write_taken(task.output, cloud, new, match.state)
         return {"points": len(cloud.points), "done": line, **match.figures}, [*built.notices, *told]
 
 

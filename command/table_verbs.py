@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import clouds, core, tools
+from .cloud_verb import Task
 from .inputs import check_beside
 from .measures import add_normal
 from .rows import TABLES, write_rows, write_text
@@ -56,8 +57,9 @@ class SectionVerb(ToolVerb):
     def beside(self, output: Path, arguments: Namespace) -> list[Path]:
         return [output.with_name(f"{output.stem}_curves.csv")] if arguments.curves else []
 
-    def taken(self, cloud: clouds.Cloud, arguments: Namespace) -> tuple[Any, Any]:
-        (position, normal, told, name), own = super().taken(cloud, arguments)
+    def taken(self, task: Task) -> tuple[Any, Any]:
+        (position, normal, told, name), own = super().taken(task)
+        cloud, arguments = task.cloud, task.arguments
         normal = normal if arguments.normal is None else arguments.normal
         if isinstance(arguments.plane, str):
             position, normal = cloud.owner.plane(arguments.plane)
@@ -66,15 +68,13 @@ class SectionVerb(ToolVerb):
             position, told = arguments.plane - cloud.place, ()
         return (position, normal, told, name), own
 
-    def write(
-        self, output: Path, cloud: clouds.Cloud, outcome: Outcome, laplacian: core.LaplaceBeltrami, arguments: Namespace
-    ) -> list[str]:
-        curves = [(curve.points + cloud.place, curve.closed) for curve in outcome.made]
+    def write(self, output: Path, task: Task, outcome: Outcome, subject: Any) -> list[str]:
+        curves = [(curve.points + task.cloud.place, curve.closed) for curve in outcome.made]
         if clouds.kind_of(output) is not None:
-            cloud.owner.add_curves(curves)
+            task.cloud.owner.add_curves(curves)
         else:
             write_rows(output, tools.cross_section.records(outcome.made))
-        for path in self.beside(output, arguments):
+        for path in self.beside(output, task.arguments):
             _write_corners(path, curves)
         return []
 
@@ -119,14 +119,12 @@ class ProfileVerb(ToolVerb):
     def beside(self, output: Path, arguments: Namespace) -> list[Path]:
         return [output.with_suffix(".svg")] if arguments.svg else []
 
-    def write(
-        self, output: Path, cloud: clouds.Cloud, outcome: Outcome, laplacian: core.LaplaceBeltrami, arguments: Namespace
-    ) -> list[str]:
+    def write(self, output: Path, task: Task, outcome: Outcome, subject: Any) -> list[str]:
         found, table = outcome.made
         if clouds.kind_of(output) is not None:
-            cloud.owner.add_profile(found.distance, found.values, table)
+            task.cloud.owner.add_profile(found.distance, found.values, table)
         else:
             write_text(output, table)
-        for path in self.beside(output, arguments):
+        for path in self.beside(output, task.arguments):
             write_text(path, profile_picture(table, NO_UNITS))
         return []

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import clouds, core, quantities, tools
-from .cloud_verb import CloudVerb, SurfaceVerb, boundary_of, floaters
+from .cloud_verb import CloudVerb, Printed, SurfaceVerb, Task, boundary_of
 from .groups import add_at, check_sources, read_sources, read_weights
 from .results import number_text
 from .settings import LAPLACIAN, chosen, default_options
@@ -51,53 +51,43 @@ class _Declared(CloudVerb):
         if "sources" in self.tool.reads:
             check_sources(parser, arguments)
 
-    def taken(self, cloud: clouds.Cloud, arguments: Namespace) -> tuple[Any, Any]:
+    def taken(self, task: Task) -> tuple[Any, Any]:
         """Return what the tool takes beside the points, and the values of its settings as attributes."""
-        own = SimpleNamespace(**chosen(self.settings, arguments))
-        return self.tool.inputs(FileCloud(cloud, arguments, self, cloud.path.stem), own), own
+        own = SimpleNamespace(**chosen(self.settings, task.arguments))
+        return self.tool.inputs(FileCloud(task.cloud, task.arguments, self, task.path.stem), own), own
 
-    def compute(
-        self, cloud: clouds.Cloud, subject: Any, inputs: Any, own: Any, arguments: Namespace, progress: Progress
-    ) -> Any:
+    def compute(self, task: Task, subject: Any, inputs: Any, own: Any) -> Any:
         """Compute what takes long."""
-        return self.tool.compute(subject, inputs, own, progress)
+        return self.tool.compute(subject, inputs, own, task.progress)
 
-    def written(
-        self, cloud: clouds.Cloud, found: Any, subject: Any, own: Any, output: Path | None, arguments: Namespace
-    ) -> tuple[dict[str, Any], list[str]]:
+    def written(self, task: Task, found: Any, subject: Any, own: Any) -> Printed:
         """Write what a tool found, and return what to print, and notices."""
         outcome = self.tool.finish(found, subject, own, number_text)
-        notices, count = [*self.read_notices, *outcome.notices], len(cloud.points)
+        notices, count = [*self.read_notices, *outcome.notices], len(task.cloud.points)
         if outcome.kept is not None:
             count = int(np.count_nonzero(outcome.kept))
-        if output is not None:
-            notices += self.write(output, cloud, outcome, subject, arguments)
-        return {"points": count, "done": f"{cloud.path.stem}: {outcome.line}", **outcome.figures}, notices
+        if task.output is not None:
+            notices += self.write(task.output, task, outcome, subject)
+        return {"points": count, "done": f"{task.path.stem}: {outcome.line}", **outcome.figures}, notices
 
-    def write(
-        self, output: Path, cloud: clouds.Cloud, outcome: Outcome, subject: Any, arguments: Namespace
-    ) -> list[str]:
+    def write(self, output: Path, task: Task, outcome: Outcome, subject: Any) -> list[str]:
         """Write an outcome, and return notices."""
-        given, values = cloud.given, outcome.values
+        given, values = task.given, outcome.values
         if outcome.kept is not None:
-            given = cloud.taken(outcome.kept)
+            given = task.cloud.taken(outcome.kept)
             values = {name: each[outcome.kept] for name, each in values.items()}
         elif outcome.points is not None:
-            given = _moved(cloud, outcome.points, subject)
+            given = _moved(task.cloud, outcome.points, subject)
         return clouds.write(output, given, values, numbers=outcome.numbers)
 
 
 class ToolVerb(_Declared, SurfaceVerb):
     """The subcommand of a tool that applies the operator."""
 
-    def work(
-        self, path: Path, given: clouds.Given, arguments: Namespace, output: Path | None, progress: Progress
-    ) -> tuple[dict[str, Any], list[str]]:
-        cloud = clouds.Cloud(path, given, floaters(arguments))
-        inputs, own = self.taken(cloud, arguments)
-        laplacian = self.laplacian(cloud, arguments, progress)
-        found = self.compute(cloud, laplacian, inputs, own, arguments, progress)
-        figures, notices = self.written(cloud, found, laplacian, own, output, arguments)
+    def work(self, task: Task) -> Printed:
+        inputs, own = self.taken(task)
+        laplacian = self.laplacian(task.cloud, task.arguments, task.progress)
+        figures, notices = self.written(task, self.compute(task, laplacian, inputs, own), laplacian, own)
         return figures, [*dict.fromkeys([*laplacian.notices, *notices])]
 
 
@@ -111,13 +101,9 @@ class PointVerb(_Declared, CloudVerb):
         """Memory at the peak."""
         return self.tool.bytes_a_point
 
-    def work(
-        self, path: Path, given: clouds.Given, arguments: Namespace, output: Path | None, progress: Progress
-    ) -> tuple[dict[str, Any], list[str]]:
-        cloud = clouds.Cloud(path, given, floaters(arguments))
-        inputs, own = self.taken(cloud, arguments)
-        found = self.compute(cloud, cloud.points, inputs, own, arguments, progress)
-        return self.written(cloud, found, cloud.points, own, output, arguments)
+    def work(self, task: Task) -> Printed:
+        (inputs, own), points = self.taken(task), task.cloud.points
+        return self.written(task, self.compute(task, points, inputs, own), points, own)
 
 
 def _moved(cloud: clouds.Cloud, points: Array, laplacian: core.LaplaceBeltrami) -> clouds.Given:

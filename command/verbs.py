@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from . import analysis, clouds, core, quantities
 from .analysis import WRITE_LIMIT
 from .bending import Deform, SplatInfo
-from .cloud_verb import CloudVerb, SurfaceVerb, floaters
+from .cloud_verb import CloudVerb, Printed, SurfaceVerb, Task
 from .mesh_verb import MeshVerb
 from .orienting import OrientVerb
 from .reference_verbs import AlignVerb, CompareVerb, MeasureVerb, TransferAttributes
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
     from pathlib import Path
 
-    from tools.tool import Array, Progress
+    from tools.tool import Array
 
 _DECLARED = {
     "align_points": AlignVerb,
@@ -53,17 +53,15 @@ class Info(CloudVerb):
     help = "summarize files of points: number, bounds, spacing, columns"
     outputs = ()
 
-    def work(
-        self, path: Path, given: clouds.Given, arguments: Namespace, output: Path | None, progress: Progress
-    ) -> tuple[dict[str, Any], list[str]]:
-        cloud = clouds.Cloud(path, given, floaters=False)
+    def work(self, task: Task) -> Printed:
+        cloud = clouds.Cloud(task.path, task.given, floaters=False)
         return {
             "points": len(cloud.points),
             "low": (cloud.points.min(axis=0) + cloud.place).tolist(),
             "high": (cloud.points.max(axis=0) + cloud.place).tolist(),
             "spacing": float(core.geometry.typical_distance(cloud.points)),
             "columns": list(cloud.columns),
-            "colors": cloud.splats is not None or given.colors is not None,
+            "colors": cloud.splats is not None or task.given.colors is not None,
         }, []
 
 
@@ -73,9 +71,8 @@ class Convert(CloudVerb):
     name = "convert"
     help = "write points to another kind of file, with all their columns"
 
-    def work(
-        self, path: Path, given: clouds.Given, arguments: Namespace, output: Path | None, progress: Progress
-    ) -> tuple[dict[str, Any], list[str]]:
+    def work(self, task: Task) -> Printed:
+        given, output = task.given, task.output
         if output is None:
             raise core.PointCloudError("Nothing would be written. Give --out or --out-dir.")
         if isinstance(given, core.splats.Splats):
@@ -132,14 +129,13 @@ class Analyze(Frames, SurfaceVerb):
     def check(self, parser: ArgumentParser, arguments: Namespace) -> None:
         self.check_sequence(parser, arguments, chosen(self.settings, arguments)["modes"])
 
-    def work(
-        self, path: Path, given: clouds.Given, arguments: Namespace, output: Path | None, progress: Progress
-    ) -> tuple[dict[str, Any], list[str]]:
-        cloud, own = clouds.Cloud(path, given, floaters(arguments)), chosen(self.settings, arguments)
-        built = self.build(cloud, chosen(LAPLACIAN.values(), arguments), progress)
+    def work(self, task: Task) -> Printed:
+        cloud, arguments, output = task.cloud, task.arguments, task.output
+        own = chosen(self.settings, arguments)
+        built = self.build(cloud, chosen(LAPLACIAN.values(), arguments), task.progress)
         laplacian, spectrum, notices, matched = built.laplacian, None, list[str](), dict[str, Any]()
         if own["modes"]:
-            spectrum, notices = analysis.resolved_modes(laplacian, own["modes"], progress)
+            spectrum, notices = analysis.resolved_modes(laplacian, own["modes"], task.progress)
         if arguments.sequence and spectrum is not None:
             places = cloud.points + cloud.place
             spectrum, overlaps, self._earlier = analysis.continued(spectrum, laplacian.areas, places, self._earlier)
@@ -150,5 +146,5 @@ class Analyze(Frames, SurfaceVerb):
             vectors = () if spectrum is None else spectrum.eigenvectors[:, : own["write_limit"]].T
             modes = {quantities.eigenvector_name(number): vector for number, vector in enumerate(vectors, 1)}
             everything = analysis.arrays(cloud.place, built, spectrum) if output.suffix.lower() == ".npz" else None
-            written = clouds.write(output, given, {**measures, **modes}, everything, numbers)
+            written = clouds.write(output, task.given, {**measures, **modes}, everything, numbers)
         return {**analysis.figures(measures, spectrum), **matched}, [*built.notices, *notices, *written]

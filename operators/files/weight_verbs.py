@@ -47,17 +47,17 @@ class WeightVerb(SurfaceVerb):
         vars(tool).update(values | {"group": group_of(obj, values["group"])} if "group" in values else values)
         return tool
 
-    def work(self, path, given, arguments, output, progress):
-        obj = given.owner.obj
-        tool = self.tool_of(obj, arguments)
-        self.prepare(tool, obj, path, arguments)
-        results = compute_all(tool.plan_all(bpy.context, [obj]), progress)
+    def work(self, task):
+        obj = task.given.owner.obj
+        tool = self.tool_of(obj, task.arguments)
+        self.prepare(tool, obj, task)
+        results = compute_all(tool.plan_all(bpy.context, [obj]), task.progress)
         ((*notices, line),) = tool.write_all(bpy.context, [obj], results)
-        if output is not None:
-            given.owner.write(given, {}, {})
+        if task.output is not None:
+            task.given.owner.write(task.given, {}, {})
         return {"points": point_count(obj.data), "done": line, **self.figures(results[0])}, notices
 
-    def prepare(self, tool, obj, path, arguments):
+    def prepare(self, tool, obj, task):
         """Give the tool what its settings do not include."""
 
     def figures(self, result) -> dict:
@@ -79,11 +79,11 @@ class WeightsFrom(WithReference, WeightVerb):
         source = self.tool_of(obj, self._own).source(bpy.context, obj, place_of(obj))
         return source._replace(name=str(path))
 
-    def prepare(self, tool, obj, path, arguments):
+    def prepare(self, tool, obj, task):
         tool.given = self._target
 
-    def work(self, *given):
-        figures, notices = super().work(*given)
+    def work(self, task):
+        figures, notices = super().work(task)
         return figures, [*self._told, *notices]
 
     def figures(self, result):
@@ -131,14 +131,14 @@ class Rig(WeightVerb):
         if others and arguments.armature == Path():
             parser.error(f"{others[0]} holds no armature: give --armature FILE")
 
-    def prepare(self, tool, obj, path, arguments):
-        name = arguments.armature_object
-        if arguments.armature != Path():
-            tool.armature = _append(arguments.armature, name)
+    def prepare(self, tool, obj, task):
+        path, name = task.arguments.armature, task.arguments.armature_object
+        if path != Path():
+            tool.armature = _append(path, name)
         else:
             followed = None if name else followed_armature(obj)
             there = sorted(each.name for each in bpy.context.scene.objects if _is_armature(each))
-            tool.armature = followed or bpy.data.objects[_choose(path, there, name)]
+            tool.armature = followed or bpy.data.objects[_choose(task.path, there, name)]
 
     def figures(self, result):
         return {"bones": len(result.names), "bones_followed": int((result.weights > 0.0).any(axis=0).sum())}

@@ -198,8 +198,8 @@ class TestReports:
     def test_files_that_were_never_reached_are_counted(self, run, folder, monkeypatch, shares):
         """A program that ends at its second file, as by SIGKILL, and shares that were not begun."""
 
-        def end(self, path, *_):
-            if path.stem == "LHD_650_13":
+        def end(self, task):
+            if task.path.stem == "LHD_650_13":
                 raise KeyboardInterrupt
             return {"points": 200}, []
 
@@ -402,8 +402,8 @@ def test_another_run_on_the_same_share_is_told(run, folder):
 
 
 def test_an_error_of_the_program_itself_is_in_the_report_and_the_other_files_are_done(run, folder, monkeypatch):
-    def fail(self, path, *_):
-        if path.stem == "LHD_650_9":
+    def fail(self, task):
+        if task.path.stem == "LHD_650_9":
             raise KeyError("x")
         return {"points": 200}, []
 
