@@ -72,14 +72,10 @@ class MESHFREE_OT_own_material(ReadyOperator, bpy.types.Operator):
     bl_label = "Own Material"
 
     @classmethod
-    def obstacle(cls, context):
-        reason = super().obstacle(context)
-        if reason:
-            return reason
-        name = context.object.name
-        if own_material(context.object) is None:
-            return f'"{name}" has no material in its first slot. Give it one in the Properties editor'
-        return "" if find_display(context.object) else f'"{name}" is seen in its own material already'
+    def lack(cls, context, obj):
+        if own_material(obj) is None:
+            return f'"{obj.name}" has no material in its first slot. Give it one in the Properties editor'
+        return "" if find_display(obj) else f'"{obj.name}" is seen in its own material already'
 
     @reporting
     def execute(self, context):

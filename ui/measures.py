@@ -160,11 +160,8 @@ class MESHFREE_OT_copy_measures(ReadyOperator, bpy.types.Operator):
     bl_options = {"REGISTER"}  # the scene is not changed
 
     @classmethod
-    def obstacle(cls, context):
-        reason = super().obstacle(context)
-        if reason or len(context.object.meshfree.parts):
-            return reason
-        return f'"{context.object.name}" has no measures. Press Measure Parts first'
+    def lack(cls, context, obj):
+        return "" if len(obj.meshfree.parts) else f'"{obj.name}" has no measures. Press Measure Parts first'
 
     def execute(self, context):
         context.window_manager.clipboard = as_text(context.object, context.scene.unit_settings)

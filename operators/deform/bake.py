@@ -226,10 +226,8 @@ class MESHFREE_OT_deform_free(BoundOperator, bpy.types.Operator):
     works_stale = True
 
     @classmethod
-    def obstacle(cls, context):
-        reason = super().obstacle(context)
-        obj = cls.subject(context)
-        return reason or ("" if is_baked(obj) else f'Nothing of "{obj.name}" is baked')
+    def lack(cls, context, obj):
+        return super().lack(context, obj) or ("" if is_baked(obj) else f'Nothing of "{obj.name}" is baked')
 
     def change(self, context, obj):
         delete_bake(obj)

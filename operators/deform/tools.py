@@ -236,8 +236,8 @@ class BoundOperator(HandledOperator):
     works_stale = False  # whether the binding may be stale
 
     @classmethod
-    def obstacle(cls, context):
-        return busy() or super().obstacle(context) or not_bound(cls.subject(context))
+    def lack(cls, context, obj):
+        return busy() or not_bound(obj)
 
     @reporting
     def execute(self, context):
@@ -273,8 +273,8 @@ class MESHFREE_OT_deform_update(HandledOperator, ApplicationOperator, bpy.types.
     writes = WRITES
 
     @classmethod
-    def obstacle(cls, context):
-        return super().obstacle(context) or not_bound(cls.subject(context))
+    def lack(cls, context, obj):
+        return not_bound(obj)
 
     def plan(self, context, obj):
         check_fresh(obj)
@@ -304,9 +304,8 @@ class MESHFREE_OT_deform_apply(BoundOperator, bpy.types.Operator):
     )
 
     @classmethod
-    def obstacle(cls, context):
-        reason = super().obstacle(context)
-        return reason or kind_of(cls.subject(context)).held(cls.subject(context))
+    def lack(cls, context, obj):
+        return super().lack(context, obj) or kind_of(obj).held(obj)
 
     def invoke(self, context, event):
         """Ask, where keyframes would be lost."""
@@ -334,9 +333,8 @@ class MESHFREE_OT_deform_to_shape_key(BoundOperator, bpy.types.Operator):
     bl_label = "To Shape Key"
 
     @classmethod
-    def obstacle(cls, context):
-        reason = super().obstacle(context)
-        return reason or kind_of(cls.subject(context)).held(cls.subject(context))
+    def lack(cls, context, obj):
+        return super().lack(context, obj) or kind_of(obj).held(obj)
 
     def change(self, context, obj):
         if obj.type != "MESH" or has_splats(obj.data):  # shape keys hold positions only
@@ -384,9 +382,8 @@ class MESHFREE_OT_deform_reset(BoundOperator, bpy.types.Operator):
     works_stale = True
 
     @classmethod
-    def obstacle(cls, context):
-        reason = super().obstacle(context)
-        return reason or kind_of(cls.subject(context)).kept(cls.subject(context))
+    def lack(cls, context, obj):
+        return super().lack(context, obj) or kind_of(obj).kept(obj)
 
     def change(self, context, obj):
         kind_of(obj).put_back(context, obj)

@@ -186,11 +186,8 @@ class MESHFREE_OT_export_eigenvalues(ExportOperator, bpy.types.Operator):
     filter_glob: file_filter(".csv")
 
     @classmethod
-    def obstacle(cls, context):
-        reason = super().obstacle(context)
-        if reason or len(read_eigenvalues(context.object)):
-            return reason
-        return f'"{context.object.name}" has no eigenvalues. Press Compute Modes first'
+    def lack(cls, context, obj):
+        return "" if len(read_eigenvalues(obj)) else f'"{obj.name}" has no eigenvalues. Press Compute Modes first'
 
     def plan(self, context, obj):
         name, values = obj.name, read_eigenvalues(obj)
@@ -214,11 +211,8 @@ class MESHFREE_OT_export_measures(ExportOperator, bpy.types.Operator):
     filter_glob: file_filter(".csv")
 
     @classmethod
-    def obstacle(cls, context):
-        reason = super().obstacle(context)
-        if reason or len(context.object.meshfree.parts):
-            return reason
-        return f'"{context.object.name}" has no measures. Press Measure Parts first'
+    def lack(cls, context, obj):
+        return "" if len(obj.meshfree.parts) else f'"{obj.name}" has no measures. Press Measure Parts first'
 
     def plan(self, context, obj):
         name, rows = obj.name, kept_rows(obj)
@@ -242,11 +236,9 @@ class MESHFREE_OT_export_profile(ExportOperator, bpy.types.Operator):
     filter_glob: file_filter(".csv", ".svg")
 
     @classmethod
-    def obstacle(cls, context):
-        reason = super().obstacle(context)
-        if reason or context.object.meshfree.profile is not None:
-            return reason
-        return f'"{context.object.name}" has no profile. Select two points and press Profile first'
+    def lack(cls, context, obj):
+        missing = f'"{obj.name}" has no profile. Select two points and press Profile first'
+        return missing if obj.meshfree.profile is None else ""
 
     def plan(self, context, obj):
         name, table, suffix = obj.name, obj.meshfree.profile.as_string(), Path(self.filepath).suffix.lower()

@@ -10,11 +10,12 @@ from ... import core
 from ...core import NotASurfaceError, PointCloudError, TooFewPointsError
 from ..objects.attributes import DISC
 from ..objects.groups import has_group
-from ..objects.reading import TYPES, find_object, obstacle, sharing_objects
+from ..objects.reading import find_object, sharing_objects
 from ..registration import Registration, Row
-from ..running.application import ApplicationOperator, Tool, operator_reader
+from ..running.application import Tool, operator_reader
 from .bones import chosen_armature, deforming_bones, ends_seen_from
 from .follow import add_modifier, bind, check_bindable, set_parent
+from .follow_tools import ArmatureOperator
 from .limits import influences, least_weight
 from .weights import MOST, named, read_weights, takes_groups, weight_names, write_weights
 
@@ -173,29 +174,11 @@ def _bind(obj, armature):
     return [] if takes_groups(obj) and DISC not in obj.data.attributes else bind(obj, armature)
 
 
-class MESHFREE_OT_auto_weights(AutoWeights, ApplicationOperator, bpy.types.Operator):
+class MESHFREE_OT_auto_weights(AutoWeights, ArmatureOperator, bpy.types.Operator):
     """Let selected points follow the bones of an armature, by weights that flow along the surface"""
 
     bl_idname = "meshfree.auto_weights"
     bl_label = "Automatic Weights"
-
-    @classmethod
-    def subject(cls, context):
-        """Return the first object whose points shall follow."""
-        found = [obj for obj in (context.object, *context.selected_objects) if obj is not None and obj.type in TYPES]
-        return next((obj for obj in found if not obstacle(obj, cls.works_in)), found[0] if found else context.object)
-
-    @classmethod
-    def obstacle(cls, context):
-        armature = cls.armature_of(context)
-        if armature is None:
-            return "No armature is chosen. Select the points, then an armature, which becomes the active object"
-        if armature.mode == "EDIT":
-            return f'"{armature.name}" is in Edit Mode. Switch to Object Mode first'
-        subject = cls.subject(context)
-        if subject == armature:
-            return f'"{armature.name}" is selected alone. Select the points too that shall follow its bones'
-        return super().obstacle(context)
 
 
 TOOLS = (Registration(MESHFREE_OT_auto_weights, panel=Row("Rig", 1, 1), menu=Row("Object", 8, 11)),)

@@ -12,12 +12,8 @@ from .bones import chosen_armature
 from .follow import add_modifier, plan_bound, set_parent, write_bound
 
 
-class MESHFREE_OT_bind_armature(ApplicationOperator, bpy.types.Operator):
-    """Let selected points and splats follow the bones of an armature by the weights that they have"""
-
-    bl_idname = "meshfree.bind_armature"
-    bl_label = "Bind to Armature"
-    writes = WRITES
+class ArmatureOperator(ApplicationOperator):
+    """An operator that lets the selected points follow the bones of an armature."""
 
     @classmethod
     def subject(cls, context):
@@ -35,6 +31,14 @@ class MESHFREE_OT_bind_armature(ApplicationOperator, bpy.types.Operator):
         if cls.subject(context) == armature:
             return f'"{armature.name}" is selected alone. Select the points too that shall follow its bones'
         return super().obstacle(context)
+
+
+class MESHFREE_OT_bind_armature(ArmatureOperator, bpy.types.Operator):
+    """Let selected points and splats follow the bones of an armature by the weights that they have"""
+
+    bl_idname = "meshfree.bind_armature"
+    bl_label = "Bind to Armature"
+    writes = WRITES
 
     def plan(self, context, obj):
         armature = chosen_armature(context)

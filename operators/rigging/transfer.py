@@ -149,11 +149,9 @@ class TransferOperator(ShownOperator):
     keeps_line = True
 
     @classmethod
-    def obstacle(cls, context):
-        reason = super().obstacle(context)
-        if reason or sides(context, False)[1]:
-            return reason
-        return f'Only "{context.object.name}" is selected. Select the objects that take values, and last the source'
+    def lack(cls, context, obj):
+        alone = f'Only "{obj.name}" is selected. Select the objects that take values, and last the source'
+        return "" if sides(context, False)[1] else alone
 
     def conclude(self, context, objects):
         if self.shown:

@@ -234,11 +234,10 @@ class MESHFREE_OT_transfer_weights(TransferWeights, TransferOperator, bpy.types.
     bl_label = "Transfer Weights"
 
     @classmethod
-    def obstacle(cls, context):
-        reason = super().obstacle(context)
-        if reason or any(has_weights(obj) for group in sides(context, False) for obj in group):
-            return reason
-        return "No selected object has weights. Select a rigged one, too, or run Automatic Weights"
+    def lack(cls, context, obj):
+        rigged = any(has_weights(each) for group in sides(context, False) for each in group)
+        there = "" if rigged else "No selected object has weights. Select a rigged one, too, or run Automatic Weights"
+        return super().lack(context, obj) or there
 
 
 TOOLS = (Registration(MESHFREE_OT_transfer_weights, panel=Row("Rig", 3, 1), menu=Row("Object", 8, 14)),)

@@ -81,7 +81,13 @@ class ReadyOperator(NoticeOperator):
     @classmethod
     def obstacle(cls, context) -> str:
         """Return what keeps the operator from running, and what to do; empty if nothing does."""
-        return obstacle(cls.subject(context), cls.works_in)
+        obj = cls.subject(context)
+        return obstacle(obj, cls.works_in) or cls.lack(context, obj)
+
+    @classmethod
+    def lack(cls, context, obj) -> str:
+        """Return what is missing beside an object that can be read and written, and what to do; empty if nothing is."""
+        return ""
 
     @classmethod
     def poll(cls, context):

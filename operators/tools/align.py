@@ -80,10 +80,7 @@ class Onto:
             self._move()
 
     @classmethod
-    def obstacle(cls, context):
-        reason = super().obstacle(context)
-        if reason:
-            return reason
+    def lack(cls, context, obj):
         other, count = cls.reference_of(context), len(others(context))
         if other is None:
             many = f"{count} others are" if count else "no other is"
@@ -114,11 +111,10 @@ class AlignObject(Onto):
         return cloud, other, shift, pairs
 
     @classmethod
-    def obstacle(cls, context):
-        reason = super().obstacle(context)
-        if not reason and moves_with(cls.reference_of(context), context.object):
-            other = cls.reference_of(context).name
-            return f'"{other}" moves with "{context.object.name}", its parent. Make it the active one'
+    def lack(cls, context, obj):
+        reason, other = super().lack(context, obj), cls.reference_of(context)
+        if not reason and moves_with(other, obj):
+            return f'"{other.name}" moves with "{obj.name}", its parent. Make it the active one'
         return reason
 
 

@@ -42,9 +42,8 @@ class MESHFREE_OT_convert(ReadyOperator, bpy.types.Operator):
     )
 
     @classmethod
-    def obstacle(cls, context):
-        old = bpy.app.version < cls.since
-        return super().obstacle(context) or ("Meshes become point clouds from Blender 4.5 on" if old else "")
+    def lack(cls, context, obj):
+        return "Meshes become point clouds from Blender 4.5 on" if bpy.app.version < cls.since else ""
 
     @reporting
     def execute(self, context):

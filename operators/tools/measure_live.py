@@ -89,11 +89,9 @@ class MESHFREE_OT_measure_live(SelectionOperator, bpy.types.Operator):
     _laplacian = None
 
     @classmethod
-    def obstacle(cls, context):
-        reason = super().obstacle(context)
-        if reason or context.object.mode == "EDIT":
-            return reason
-        return f'"{context.object.name}" is not in Edit Mode. Switch to Edit Mode first, where points are selected'
+    def lack(cls, context, obj):
+        elsewhere = f'"{obj.name}" is not in Edit Mode. Switch to Edit Mode first, where points are selected'
+        return "" if obj.mode == "EDIT" else elsewhere
 
     def invoke(self, context, event):
         return self.execute(context) if followed(context.object) else super().invoke(context, event)

@@ -87,11 +87,8 @@ class MESHFREE_OT_separate_by_segment(ApplicationOperator, bpy.types.Operator):
     bl_label = "Separate by Segment"
 
     @classmethod
-    def obstacle(cls, context):
-        reason = super().obstacle(context)
-        if reason or SEGMENT in context.object.data.attributes:
-            return reason
-        return f'"{context.object.name}" has no parts. Segment it first'
+    def lack(cls, context, obj):
+        return "" if SEGMENT in obj.data.attributes else f'"{obj.name}" has no parts. Segment it first'
 
     def plan(self, context, obj):
         leaving = [other for other in context.selected_objects if other.meshfree.make_single_user]

@@ -42,11 +42,8 @@ class SplatOperator(ReadyOperator):
     takes = staticmethod(has_splats)  # whether it works on the data of an object
 
     @classmethod
-    def obstacle(cls, context):
-        reason = super().obstacle(context)
-        if reason or cls.takes(context.object.data):
-            return reason
-        return f'"{context.object.name}" holds no Gaussian splats. Import a file of splats'
+    def lack(cls, context, obj):
+        return "" if cls.takes(obj.data) else f'"{obj.name}" holds no Gaussian splats. Import a file of splats'
 
 
 class MESHFREE_OT_apply_to_splats(SplatOperator, bpy.types.Operator):
@@ -85,11 +82,9 @@ class MESHFREE_OT_join_splats(SplatOperator, bpy.types.Operator):
     bl_label = "Join Splats"
 
     @classmethod
-    def obstacle(cls, context):
-        reason = super().obstacle(context)
-        if reason or _others(context):
-            return reason
-        return f'Select further objects of splats, to join with "{context.object.name}"'
+    def lack(cls, context, obj):
+        alone = "" if _others(context) else f'Select further objects of splats, to join with "{obj.name}"'
+        return super().lack(context, obj) or alone
 
     @reporting
     def execute(self, context):
