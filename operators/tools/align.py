@@ -8,7 +8,6 @@ from ...core import PointCloudError
 from ...tools import align_points
 from ..objects.place import check_movable, move_object, moves_with
 from ..objects.reading import TYPES, find_object, obstacle
-from ..objects.result import length_text
 from .declared import registration_of
 from .select import selection
 
@@ -64,15 +63,13 @@ class Onto:
     def plan(self, context, obj):
         planned = super().plan(context, obj)
         motion = Motion(obj, self.reference_of(context)) if self.moves else None
-        return lambda progress: (planned(progress), motion)
+        return lambda progress: (*planned(progress), motion)
 
-    def write(self, context, obj, result):
-        planned, motion = result
+    def store(self, context, obj, outcome, result):
+        super().store(context, obj, outcome, result)
+        *_, motion = result
         if motion is not None:
-            found, points, own, _ = planned
-            matrix = self.tool.finish(found, points, own, length_text).matrix
-            self._move = lambda: motion.apply(obj, matrix)
-        return super().write(context, obj, planned)
+            self._move = lambda: motion.apply(obj, outcome.matrix)
 
     def conclude(self, context, objects):
         super().conclude(context, objects)

@@ -33,7 +33,7 @@ class CompareObjects(Onto):
 
     def write(self, context, obj, result):
         texts = super().write(context, obj, result)
-        (found, _, own, _), _ = result
+        found, _, own, *_ = result
         obj.meshfree.compared_with = bpy.data.objects.get(found.other)
         obj.meshfree.compared_within = own.greatest
         obj.meshfree.compared_nearest = own.distance == "NEAREST"

@@ -161,13 +161,18 @@ class Declared(Tool):
         return compute
 
     def write(self, context, obj, result):
-        found, laplacian, own, reading = result
-        outcome = self.tool.finish(found, laplacian, own, length_text)
+        found, subject, own, *_ = result
+        outcome = self.tool.finish(found, subject, own, length_text)
+        self.store(context, obj, outcome, result)
+        write_numbers(obj, outcome.numbers)
+        return [f"{obj.name}: {text}" for text in (*outcome.notices, outcome.line)]
+
+    def store(self, context, obj, outcome, result):
+        """Write what is at the points."""
+        reading = result[3]
         local = {name: local_values(reading, name, values) for name, values in outcome.values.items()}
         write_values(obj.data, local)
         tag_changed(obj.data)
-        write_numbers(obj, outcome.numbers)
-        return [f"{obj.name}: {text}" for text in (*outcome.notices, outcome.line)]
 
 
 class Pointwise(Declared):
@@ -180,13 +185,10 @@ class Pointwise(Declared):
         inputs = self.inputs(ObjectCloud(context, obj, self, reading, operator), own)
         return lambda progress: (tool.compute(reading.points, inputs, own, progress), reading.points, own, reading)
 
-    def write(self, context, obj, result):
-        found, points, own, _ = result
-        kept = self.tool.finish(found, points, own, length_text).kept
-        texts = super().write(context, obj, result)
-        if kept is not None and not kept.all():
-            keep_points(context, obj, kept)
-        return texts
+    def store(self, context, obj, outcome, result):
+        super().store(context, obj, outcome, result)
+        if outcome.kept is not None and not outcome.kept.all():
+            keep_points(context, obj, outcome.kept)
 
 
 class Moving(Declared):
@@ -220,14 +222,11 @@ class Moving(Declared):
         """Whether something turns with the points, such as splats."""
         return has_splats(obj.data)
 
-    def write(self, context, obj, result):
-        found, laplacian, own, reading, gradients, discs = result
-        outcome = self.tool.finish(found, laplacian, own, length_text)
+    def store(self, context, obj, outcome, result):
+        found, _, _, reading, gradients, discs = result
         if outcome.points is not None:
             title = self.tool.title(found)
             self.put(context, write_positions(obj, reading, outcome.points, self.goal, title, gradients, discs))
-        write_numbers(obj, outcome.numbers)
-        return [f"{obj.name}: {text}" for text in (*outcome.notices, outcome.line)]
 
     def put(self, context, key):
         """Finish with the shape key that holds the result, if there is one."""
