@@ -13,11 +13,9 @@ from bpy.props import (
 )
 
 from ...tools.groups import ANCHOR, HANDLE
-from .handlers import notify
+from .handlers import notify, telling
 
-
-def _follow(settings, context):
-    notify("deform_changed", settings.id_data)
+_follow = telling("deform_changed")
 
 
 def _find_bound(settings, context):

@@ -31,6 +31,11 @@ def notify(event: str, *arguments):
         function(*arguments)
 
 
+def telling(event: str):
+    """Return the update function of a setting that calls the handlers of an event with its object."""
+    return lambda settings, context: notify(event, settings.id_data)
+
+
 def add_handlers(handlers):
     """Add functions as handlers of events, by the names in `bpy.app.handlers` or above."""
     for event, function in handlers.items():

@@ -15,30 +15,19 @@ from bpy.props import (
 from ...tools.laplacian import LAPLACIAN
 from . import deform_settings, notices, parts
 from .color_choices import color_choice
-from .handlers import notify
+from .handlers import notify, telling
 from .properties import property_of, with_properties
 
-
-def _recolor(settings, context):
-    notify("colors_changed", settings.id_data)
+_recolor = telling("colors_changed")
+_resize = telling("size_changed")
+_reshape = telling("shape_changed")
+_show_groups = telling("groups_changed")
 
 
 def _recolor_locked(settings, context):
     """Follow bounds that are set; in other modes they only show the resulting range."""
     if settings.range_mode == "LOCKED":
-        notify("colors_changed", settings.id_data)
-
-
-def _resize(settings, context):
-    notify("size_changed", settings.id_data)
-
-
-def _reshape(settings, _context):
-    notify("shape_changed", settings.id_data)
-
-
-def _show_groups(settings, context):
-    notify("groups_changed", settings.id_data)
+        _recolor(settings, context)
 
 
 def _redraw(settings, context):
