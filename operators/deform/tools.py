@@ -22,7 +22,7 @@ from ..objects.carried import carried, shown_moved, write_discs
 from ..objects.groups import assign, check_assignable, group_weights, handle_names, has_group
 from ..objects.handlers import notify
 from ..objects.modifiers import get_input
-from ..objects.place import activate
+from ..objects.place import activate, link_beside
 from ..objects.positions import add_key, check_movable
 from ..objects.reading import read_points, shape_keys
 from ..objects.result import length_text
@@ -215,8 +215,7 @@ def _add_empty(context, obj, name, rest, rows):
     )
     empty.parent = obj
     empty.location = Vector(points.mean(axis=0))
-    for collection in obj.users_collection:
-        collection.objects.link(empty)
+    link_beside(empty, obj)
     context.view_layer.update()
     return empty
 
@@ -225,8 +224,7 @@ def _copy_empty(obj, empty):
     """Copy an empty, with its animation, for a copied object."""
     copy = empty.copy()
     copy.parent = obj
-    for collection in obj.users_collection:
-        collection.objects.link(copy)
+    link_beside(copy, obj)
     return copy
 
 

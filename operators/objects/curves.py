@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 
 from ...core import PointCloudError
-from .place import OFFSET
+from .place import OFFSET, link_beside
 
 
 def add_curves(obj, name, lines, thickness=0.0):
@@ -24,7 +24,7 @@ def add_curves(obj, name, lines, thickness=0.0):
     bpy.types.Object
     """
     made = bpy.data.objects.new(name, _curve(name, lines, thickness))
-    _link(made, obj)
+    link_beside(made, obj)
     made.matrix_world = obj.matrix_world
     if OFFSET in obj:
         made[OFFSET] = obj[OFFSET]
@@ -50,16 +50,10 @@ def plot(obj, name, across, values):
     runs = np.split(np.arange(len(values)), np.flatnonzero(np.diff(known)) + 1)
     lines = [(places[run], False) for run in runs if known[run[0]] and len(run) > 1]
     made = bpy.data.objects.new(name, _curve(name, lines, 0.0))
-    _link(made, obj)
+    link_beside(made, obj)
     made.rotation_euler.x = 0.5 * np.pi
     made.location.xy = obj.matrix_world.translation.xy
     return made
-
-
-def _link(made, obj):
-    """Link an object to the collections of another one."""
-    for collection in obj.users_collection:
-        collection.objects.link(made)
 
 
 def _curve(name, lines, thickness):

@@ -4,7 +4,9 @@ import bmesh
 import bpy
 
 from ...core import PointCloudError
+from ...tools.quantities import EIGENVALUES
 from .attributes import SELECTION, tag_changed, write_attribute
+from .place import link_beside
 
 
 def check_deletable(obj):
@@ -28,6 +30,18 @@ def keep_points(context, obj, kept):
         shape.free()
         tag_changed(obj.data)
     context.view_layer.update()  # the display follows
+
+
+def split_off(context, obj, name, members):
+    """Return a new object with some points of another one, (n,) bool, which keeps them, too."""
+    part = obj.copy()
+    part.name = name
+    part.data = obj.data.copy()
+    part.data.name = part.name
+    part.pop(EIGENVALUES, None)  # those of the whole
+    link_beside(part, obj)
+    keep_points(context, part, members)
+    return part
 
 
 def _keep_in_cloud(context, obj, kept):

@@ -82,6 +82,12 @@ def moves_with(obj, other) -> bool:
     return obj is not None
 
 
+def link_beside(made, obj):
+    """Link a new object to the collections of another one."""
+    for collection in obj.users_collection:
+        collection.objects.link(made)
+
+
 def hide(obj, hidden=True):
     """Hide an object in views and in renders, or show it."""
     obj.hide_set(hidden)

@@ -10,11 +10,11 @@ from ...tools import stray_points, thin_out
 from ...tools.quantities import COMPONENT, STRAY, quantity
 from ...tools.settings import Choice, by_name
 from ..objects.attributes import point_count, read_attribute, tag_changed
-from ..objects.deleting import check_deletable, keep_points
+from ..objects.deleting import check_deletable, keep_points, split_off
 from ..objects.handlers import notify
 from ..objects.properties import property_of, values_of, with_properties
 from ..objects.reading import read_points
-from ..objects.result import EIGENVALUES, is_analyzed, is_stale
+from ..objects.result import is_analyzed, is_stale
 from ..registration import Registration, Row
 from ..running import cache
 from ..running.stages import Stages
@@ -121,7 +121,8 @@ class StrayActions(StraySettings):
             return ""
         parts, text = [obj], ""
         if self.action == "SEPARATE":
-            parts.append(_separate(context, obj, found))
+            parts.append(split_off(context, obj, f"{obj.name} Stray", found))
+            keep_points(context, obj, ~found)
             text = f', in "{parts[-1].name}"'
         for part in parts:
             notify("strays_gone", part)
@@ -130,20 +131,6 @@ class StrayActions(StraySettings):
     def conclude(self, context, objects):
         if self.action == "SHOW":
             super().conclude(context, objects)
-
-
-def _separate(context, obj, found):
-    """Move points, (n,) bool, to an object of their own, and return it."""
-    part = obj.copy()
-    part.name = f"{obj.name} Stray"
-    part.data = obj.data.copy()
-    part.data.name = part.name
-    part.pop(EIGENVALUES, None)
-    for collection in obj.users_collection:
-        collection.objects.link(part)
-    keep_points(context, part, found)
-    keep_points(context, obj, ~found)
-    return part
 
 
 class ThinActions:

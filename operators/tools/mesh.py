@@ -13,7 +13,7 @@ from ..objects.color_choices import COLOR_CHOICES
 from ..objects.colors import COLORS, own_colors, splat_colors
 from ..objects.groups import add_group
 from ..objects.handlers import notify
-from ..objects.place import activate, copy_place, hide
+from ..objects.place import activate, copy_place, hide, link_beside
 from ..objects.splats import has_splats
 from ..running.measures import carry
 from .declared import registration_of
@@ -49,8 +49,7 @@ class MeshObject:
     def write(self, context, obj, result):
         vertices, faces, carried, notices = result
         made = bpy.data.objects.new(f"{obj.name} Surface", _mesh(f"{obj.name} Surface", vertices, faces))
-        for collection in obj.users_collection:
-            collection.objects.link(made)
+        link_beside(made, obj)
         made.matrix_world = obj.matrix_world
         copy_place(made, obj)
         opened = close_holes(made.data, mesh_surface.GAP if self.keep_open else 0)

@@ -8,7 +8,7 @@ from ...core import PointCloudError
 from ...tools import segment
 from ...tools.quantities import SEGMENT
 from ..objects.attributes import read_attribute, write_attribute
-from ..objects.deleting import keep_points
+from ..objects.deleting import keep_points, split_off
 from ..objects.result import EIGENVALUES, check_writable
 from ..registration import Registration, Row
 from ..running.application import ApplicationOperator
@@ -105,13 +105,7 @@ class MESHFREE_OT_separate_by_segment(ApplicationOperator, bpy.types.Operator):
         numbers = np.delete(numbers, np.argmax(counts))
         obj.pop(EIGENVALUES, None)  # those of the whole
         for number in numbers:
-            part = obj.copy()
-            part.name = f"{obj.name} {GROUP.format(number)}"
-            part.data = obj.data.copy()
-            part.data.name = part.name
-            for collection in obj.users_collection:
-                collection.objects.link(part)
-            keep_points(context, part, result == number)
+            split_off(context, obj, f"{obj.name} {GROUP.format(number)}", result == number)
         keep_points(context, obj, ~np.isin(result, numbers))
         return [f"{obj.name}: {len(numbers) + 1} parts are objects of their own"]
 
