@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from . import core, quantities
+from . import core, quantities, tools
 from .settings import Setting
 
 if TYPE_CHECKING:
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
     from tools.tool import Array, Progress
 
+Choice = tools.settings.Choice
 FILLED, TAKEN, FAR = range(len(quantities.quantity(quantities.TRANSFER).names))
 _NAMED = 5  # attributes that a notice names
 
-MATCH = {
-    setting.name: setting
-    for setting in (
+MATCH = tools.settings.by_name(
+    (
         Setting(
             "distance",
             "Points farther from the surface are filled in from around; 0 for 5 % of the size of the source, or two"
@@ -39,19 +39,22 @@ MATCH = {
             form="DEGREES",
         ),
     )
-}
-ATTRIBUTES = {
-    setting.name: setting
-    for setting in (
+)
+ATTRIBUTES = tools.settings.by_name(
+    (
         Setting(
             "attributes",
             "Which attributes of the source are transferred",
             "ALL",
-            choices=("ALL", "COLOR", "NAMES"),
+            choices=(
+                Choice("ALL", "All Attributes", "All attributes at points, but for results of this extension"),
+                Choice("COLOR", "Active Color", "The colors that the source is shown in"),
+                Choice("NAMES", "By Name", "Those whose names match the pattern, results of this extension among them"),
+            ),
         ),
         Setting("pattern", "Names of attributes, for By Name: * stands for any text, ? for one character", "*"),
     )
-}
+)
 
 
 class Match(NamedTuple):

@@ -58,12 +58,6 @@ class Setting(NamedTuple):
         """The values to choose from."""
         return tuple(choice if isinstance(choice, str) else choice.value for choice in self.choices)
 
-    @property
-    def keywords(self) -> dict[str, Any]:
-        """What a property of Blender takes, but its name and what is of the interface alone."""
-        given = {"description": self.description, "default": self.default, "min": self.least, "max": self.most}
-        return {name: value for name, value in given.items() if value is not None}
-
 
 def by_name(settings: Iterable[Setting]) -> dict[str, Setting]:
     """Return settings by their names."""

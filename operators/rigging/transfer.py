@@ -4,7 +4,7 @@ from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
-from bpy.props import BoolProperty, FloatProperty
+from bpy.props import BoolProperty
 
 from ...command import transferring
 from ...command.naming import naming
@@ -12,6 +12,7 @@ from ...core import PointCloudError
 from ...tools.quantities import TRANSFER
 from ..objects.attributes import tag_changed, write_attribute
 from ..objects.handlers import notify
+from ..objects.properties import property_of
 from ..objects.reading import TYPES, obstacle
 from ..objects.result import length_text
 from ..running.application import ShownOperator, Tool, chosen_objects, operator_reader
@@ -54,8 +55,8 @@ class Transfer(Tool):
         description="From the other selected objects to the active one; otherwise from the active one to the others",
         default=False,
     )
-    distance: FloatProperty(name="Distance", subtype="DISTANCE", **transferring.MATCH["distance"].keywords)
-    angle: FloatProperty(name="Angle", subtype="ANGLE", **transferring.MATCH["angle"].keywords)
+    distance: property_of(transferring.MATCH["distance"])
+    angle: property_of(transferring.MATCH["angle"])
     preview: BoolProperty(
         name="Preview",
         description="Only color the points by what they would take, and change nothing else",

@@ -4,13 +4,13 @@ from typing import NamedTuple
 
 import bpy
 import numpy as np
-from bpy.props import EnumProperty, StringProperty
 
 from ...command import transferring
 from ...core import PointCloudError
 from ...tools.quantities import quantity
 from ..objects.attributes import STORABLE, check_names, point_count, read_attribute, write_attribute
 from ..objects.colors import COLORS, own_colors
+from ..objects.properties import property_of
 from ..registration import Registration, Row
 from .transfer import Transfer, TransferOperator
 
@@ -60,16 +60,8 @@ class TransferAttributes(Transfer):
     shows_colors = True
     asks = ("reverse", "distance", "angle", "attributes", "pattern", "preview", "show")
 
-    attributes: EnumProperty(
-        name="Attributes",
-        items=[
-            ("ALL", "All Attributes", "All attributes at points, but for results of this extension"),
-            ("COLOR", "Active Color", "The colors that the source is shown in"),
-            ("NAMES", "By Name", "Those whose names match the pattern, results of this extension among them"),
-        ],
-        **transferring.ATTRIBUTES["attributes"].keywords,
-    )
-    pattern: StringProperty(name="Pattern", **transferring.ATTRIBUTES["pattern"].keywords)
+    attributes: property_of(transferring.ATTRIBUTES["attributes"])
+    pattern: property_of(transferring.ATTRIBUTES["pattern"])
 
     def shown_result(self):
         return self._shown
