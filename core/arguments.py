@@ -36,13 +36,7 @@ def whole(given: Any) -> float:
 
 
 def positive(given: Any, name: str) -> float:
-    """Return a finite number above zero as a float.
-
-    Raises
-    ------
-    PointCloudError
-        It is something else.
-    """
+    """Return a finite number above zero as a float; something else raises `PointCloudError`."""
     number = real(given)
     if not 0.0 < number < np.inf:
         raise PointCloudError(f"The {name} is {given!r}. Use a number above zero.")
@@ -50,13 +44,7 @@ def positive(given: Any, name: str) -> float:
 
 
 def not_negative(given: Any, name: str) -> float:
-    """Return a finite number that is not negative as a float.
-
-    Raises
-    ------
-    PointCloudError
-        It is something else.
-    """
+    """Return a finite number that is not negative as a float; something else raises `PointCloudError`."""
     number = real(given)
     if not 0.0 <= number < np.inf:
         raise PointCloudError(f"The {name} is {given!r}. Use a number that is not negative.")
@@ -64,13 +52,7 @@ def not_negative(given: Any, name: str) -> float:
 
 
 def as_path(given: FilePath) -> Path:
-    """Return the path of a name.
-
-    Raises
-    ------
-    PointCloudError
-        It is neither a text nor path-like.
-    """
+    """Return the path of a name; what is neither a text nor path-like raises `PointCloudError`."""
     try:
         return Path(given)
     except TypeError as error:
@@ -78,26 +60,14 @@ def as_path(given: FilePath) -> Path:
 
 
 def check_switches(**switches: Any) -> None:
-    """Check that arguments are truth values.
-
-    Raises
-    ------
-    PointCloudError
-        One of them is something else.
-    """
+    """Check that arguments are truth values; something else raises `PointCloudError`."""
     for name, value in switches.items():
         if not isinstance(value, bool | np.bool_):
             raise PointCloudError(f"Option {name} is {value!r}. Use True or False.")
 
 
 def as_array(given: ArrayLike, name: str) -> Array:
-    """Return an argument as an array of any shape and type.
-
-    Raises
-    ------
-    InvalidPointsError
-        Rows of different lengths, or masked values.
-    """
+    """Return an argument as an array; rows of different lengths, or masked values, raise `InvalidPointsError`."""
     try:
         array = np.asarray(given)
     except (TypeError, ValueError) as error:
@@ -145,13 +115,7 @@ def _fits(shape: tuple[int, ...], wanted: Shape) -> bool:
 
 
 def check_finite(array: Array, name: str, advice: str, limit: float = np.inf) -> None:
-    """Refuse rows with numbers that are not finite, or not below a limit, and say how many.
-
-    Raises
-    ------
-    InvalidPointsError
-        There are some.
-    """
+    """Raise `InvalidPointsError` if numbers are not finite, or not below a limit, and say in how many rows."""
     rows = np.reshape(array, (-1, np.prod(array.shape[1:], dtype=int)))
     bad = int(np.count_nonzero(~(np.abs(rows) < limit).all(axis=1)))
     if bad:

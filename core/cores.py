@@ -15,12 +15,8 @@ VARIABLE = "MESHFREE_CORES"
 def cores() -> int:
     """Return how many cores this process may use: what the variable MESHFREE_CORES says, or else what it is given.
 
-    A scheduler gives a job some of a node's cores, by its affinity or by the limit of a container.
-
-    Raises
-    ------
-    PointCloudError
-        The variable is no whole number above zero.
+    A scheduler gives a job some of a node's cores, by its affinity or by the limit of a container. A variable that is
+    no whole number above zero raises `PointCloudError`.
     """
     text = os.environ.get(VARIABLE, "").strip()
     if text:

@@ -28,18 +28,7 @@ RESOLVED = 2.2
 
 
 def kernel(q: ArrayLike) -> Floats:
-    """Evaluate the kernel W_1.
-
-    Parameters
-    ----------
-    q : array_like
-        Distances in units of the smoothing length, non-negative.
-
-    Returns
-    -------
-    ndarray
-        Same shape; zero beyond the support of 3.
-    """
+    """Evaluate the kernel W_1 at distances in units of the smoothing length; it is zero beyond the support of 3."""
     q = np.asarray(q, dtype=np.float64)
     return NORMALIZATION * (_power(3.0 - q, 5) - 6.0 * _power(2.0 - q, 5) + 15.0 * _power(1.0 - q, 5))
 
@@ -63,15 +52,8 @@ def pair_kernel(q: ArrayLike) -> Floats:
 def symbol(t: ArrayLike) -> Floats:
     """Evaluate s(t): on a flat patch a wave of frequency k has the eigenvalue ``s(k h) / h**2``.
 
-    Parameters
-    ----------
-    t : array_like
-        Frequencies times the smoothing length, non-negative.
-
-    Returns
-    -------
-    ndarray
-        ``-4 pi * integral_0^3 W_1'(r) (1 - J0(t r)) dr``, by Gauss-Legendre quadrature on the spline's three intervals.
+    It is ``-4 pi * integral_0^3 W_1'(r) (1 - J0(t r)) dr``, by Gauss-Legendre quadrature on the spline's three
+    intervals, for frequencies times the smoothing length, not negative.
     """
     nodes, weights = np.polynomial.legendre.leggauss(24)
     radii = np.concatenate([(nodes + 1.0) / 2.0 + start for start in range(3)])
@@ -81,18 +63,10 @@ def symbol(t: ArrayLike) -> Floats:
 
 
 def inverse_ratio(s: ArrayLike) -> Floats:
-    """Invert the symbol on its increasing branch.
+    """Invert the symbol on its increasing branch: return ``t^2 / s`` for the t with ``symbol(t) = s``, not negative.
 
-    Parameters
-    ----------
-    s : array_like
-        Values of the symbol, non-negative.
-
-    Returns
-    -------
-    ndarray
-        ``t^2 / s`` for the t with ``symbol(t) = s``: smooth and close to one, so that small eigenvalues keep their
-        relative accuracy. Infinite past the resolved range, ``s(2.2) = 2.82``.
+    It is smooth and close to one, so that small eigenvalues keep their relative accuracy. It is infinite past the
+    resolved range, ``s(2.2) = 2.82``.
     """
     s = np.asarray(s, dtype=np.float64)
     ratio, limit = _inverse_table()

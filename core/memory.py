@@ -26,21 +26,10 @@ _GROUPS = (
 
 
 def needed_memory(count: int, options: LaplacianOptions, modes: int = 0) -> int:
-    """Estimate the most memory that an operator takes while it is built and its modes are computed.
+    """Estimate the most bytes that an operator takes while it is built and so many modes are computed.
 
-    Parameters
-    ----------
-    count : int
-        Points.
-    options : LaplacianOptions
-        The kernel's width decides.
-    modes : int
-        Vibration modes that are to be computed.
-
-    Returns
-    -------
-    int
-        Bytes. Those of random points, which have the widest kernels; even samples take half.
+    The kernel's width decides, which the options give. They are those of random points, which have the widest kernels;
+    even samples take half.
     """
     return int(count * (_PER_NEIGHBOR * (points_in_kernel(options) + _ALONE) + _PER_MODE * modes))
 
@@ -69,17 +58,9 @@ def points_that_fit(options: LaplacianOptions, modes: int = 0) -> int | None:
 
 
 def check_memory(count: int, options: LaplacianOptions, modes: int = 0) -> None:
-    """Refuse to build an operator that does not fit the free memory.
+    """Refuse to build an operator that does not fit the free memory, as of `needed_memory`, by `NotEnoughMemoryError`.
 
-    Parameters
-    ----------
-    count, options, modes
-        See `needed_memory`.
-
-    Raises
-    ------
-    NotEnoughMemoryError
-        It does not fit; the text says how many points do.
+    Its text says how many points fit.
     """
     check_room(count, needed_memory(1, options, modes), "Use fewer points, a narrower kernel, or free memory.")
 
@@ -122,19 +103,7 @@ def check_room(count: int, each: int, advice: str = "Use fewer points, or free m
 
 
 def check_mode_memory(count: int, modes: int) -> None:
-    """Refuse to compute modes that do not fit the free memory.
-
-    Parameters
-    ----------
-    count : int
-        Points.
-    modes : int
-
-    Raises
-    ------
-    NotEnoughMemoryError
-        They do not fit; the text says how many modes do.
-    """
+    """Refuse to compute modes that do not fit the free memory, by `NotEnoughMemoryError`, which says how many do."""
     free = available_memory()
     if free is None:
         return

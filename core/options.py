@@ -140,12 +140,6 @@ def _make_positive(options: LaplacianOptions | PaperOptions, name: str) -> None:
 
 
 def check_options(options: Any) -> None:
-    """Check that options are `LaplacianOptions`.
-
-    Raises
-    ------
-    PointCloudError
-        They are something else.
-    """
+    """Check that options are `LaplacianOptions`; something else raises `PointCloudError`."""
     if not isinstance(options, LaplacianOptions):
         raise PointCloudError(f"The options are {options!r}. Use LaplacianOptions(...).")

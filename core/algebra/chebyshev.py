@@ -37,19 +37,10 @@ def chebyshev_sum(product: Callable[[Floats], Floats], coefficients: Floats, sta
 
 
 def chebyshev_terms(product: Callable[[Floats], Floats], start: Floats) -> Iterator[Floats]:
-    """Yield ``T_0(M) y``, ``T_1(M) y`` and so on, without end, for the Chebyshev polynomials T_k.
+    """Yield ``T_0(M) y``, ``T_1(M) y`` and so on, without end, for the Chebyshev polynomials T_k; not to be changed.
 
-    Parameters
-    ----------
-    product : callable
-        y -> M y, a new array each time. The eigenvalues of M should lie in [-1, 1], where no term grows.
-    start : ndarray
-        y, of any shape.
-
-    Yields
-    ------
-    ndarray
-        Not to be changed.
+    `product` returns M y for y, of any shape, as a new array. The eigenvalues of M should lie in [-1, 1], where no term
+    grows.
     """
     yield start
     before, now = start, product(start)

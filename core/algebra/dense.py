@@ -16,14 +16,7 @@ _BLOCK = 1 << 13  # small matrices
 def product(left: Array, right: Array) -> Array:
     """Return ``left @ right`` of two matrices, (m, k) and (k, n), of one precision; fast if they are contiguous.
 
-    Parameters
-    ----------
-    left, right : ndarray, (m, k) and (k, n)
-        In single or double precision. Transposes and slices of rows are used as they are; other slices are copied.
-
-    Returns
-    -------
-    ndarray, (m, n)
+    Transposes and slices of rows are used as they are; other slices are copied.
     """
     (m, k), n = left.shape, right.shape[1]
     gemm = get_blas_funcs("gemm", (left, right))
@@ -73,17 +66,10 @@ def inverses(matrices: Floats) -> Floats:
 
 
 def eliminate(equations: Floats) -> Floats:
-    """Solve many small symmetric positive definite systems at one time, by elimination in place.
+    """Solve k small symmetric positive definite systems at one time, by elimination in place.
 
-    Parameters
-    ----------
-    equations : ndarray, (c, c + m, k)
-        Of k systems, the matrices first and then m right sides.
-
-    Returns
-    -------
-    ndarray, (c, c + m, k)
-        The same array: the inverses, and then the solutions.
+    The equations, (c, c + m, k), are the matrices and then m right sides; the array is returned with inverses and
+    solutions.
     """
     for pivot, row in enumerate(equations):
         column = equations[:, pivot].copy()

@@ -85,18 +85,9 @@ def _ranks_along(points: Floats, part: Ints, size: Ints) -> Ints:
 def sparsify(stiffness: sparse.csr_array, share: float = 1e-2) -> sparse.csr_array:
     """Leave out the pairs of negligible weight, which makes factors smaller.
 
-    Parameters
-    ----------
-    stiffness : csr_array, (n, n)
-        Symmetric, rows sum to zero, nothing positive off the diagonal.
-    share : float
-        Pairs whose weight is below this share of the diagonal at both ends are left out. The kernel falls off so
-        steeply that these are more than half of the pairs, with a few percent of the weight.
-
-    Returns
-    -------
-    csr_array, (n, n)
-        With the same properties; the given one where components would lose their connection.
+    Their weight is below a share of the diagonal at both ends. The kernel falls off so steeply that these are more than
+    half of the pairs, with a few percent of the weight. Rows of the stiffness sum to zero, and nothing is positive off
+    the diagonal, before and after. The given matrix is returned where components would lose their connection.
     """
     pairs, diagonal = stiffness.tocoo(), stiffness.diagonal()
     kept = -pairs.data > share * np.minimum(diagonal[pairs.row], diagonal[pairs.col])  # not the diagonal

@@ -163,12 +163,8 @@ def _single(matrix: sparse.csr_array) -> sparse.csr_array:
 def aggregates(matrix: Rows, diagonal: Floats, share: float, report: Report) -> tuple[Ints, Ints]:
     """Aggregate the unknowns of a matrix around roots, no two of which couple strongly.
 
-    Returns
-    -------
-    part : ndarray, (n,) int
-        Number of each unknown's part.
-    roots : ndarray, (m,) int
-        The root of each part, which couples strongly with all of it.
+    Return the number of each unknown's part, (n,), and the root of each part, (m,), which couples strongly with all of
+    it.
     """
 
     def strong(rows: slice, part: sparse.csr_array) -> tuple[Array, Array, Array]:
@@ -239,19 +235,11 @@ def solve_roughly(levels: list[Level], last: Known, load: Array, shifts: Array, 
 
 
 def approximate_inverse(matrix: sparse.csr_array, pool: ThreadPoolExecutor, report: Report) -> LinearOperator | None:
-    """Return an approximate inverse that is symmetric, for conjugate gradients.
+    """Return an approximate inverse that is symmetric, for conjugate gradients; None where coarse versions do not help.
 
-    Parameters
-    ----------
-    matrix : csr_array, (n, n)
-        Symmetric positive semi-definite, constants about in its null space. No diagonal entry is zero.
-    pool, report
-        As of `Rows`.
-
-    Returns
-    -------
-    LinearOperator, (n, n), or None
-        A V-cycle in single precision, of one column or several at once; None where coarse versions do not help.
+    It is a V-cycle in single precision, of one column or several at once. The matrix is symmetric positive
+    semi-definite, with constants about in its null space and no zero on its diagonal. For `pool` and `report` see
+    `Rows`.
     """
     levels, last, _ = build_levels(matrix, np.ones(matrix.shape[0]), SMALL, 0, pool, report)
     if not levels or last.shape[0] > SMALL:

@@ -63,16 +63,8 @@ def nearest_rotations(matrices: Floats) -> Floats:
 def rotations_in_groups(matrices: Floats, group: Ints) -> Floats:
     """Find the nearest rotations; where a matrix leaves the angle about an axis free, it is that of its group.
 
-    Parameters
-    ----------
-    matrices : ndarray, (3, 3, n)
-        As of `nearest_rotations`.
-    group : ndarray, (n,) int
-        Numbers from 0 on; the rotation of a group is that of the sum of its matrices.
-
-    Returns
-    -------
-    ndarray, (3, 3, n)
+    Matrices and rotations are (3, 3, n), groups, (n,), are numbered from 0 on; the rotation of a group is that of the
+    sum of its matrices.
     """
     count = len(group)
     members = sparse.csr_array((np.ones(count), group, np.arange(count + 1)))

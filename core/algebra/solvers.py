@@ -170,26 +170,10 @@ def solve_symmetric(
 
 
 def solve_columns(matrix: sparse.csr_array, loads: Floats, rtol: float, report: Callable[[float], None]) -> Floats:
-    """Solve positive definite equations for many right-hand sides at once, by conjugate gradients of each.
+    """Solve positive definite equations for many right-hand sides, (m, k), at once, by conjugate gradients of each.
 
-    Parameters
-    ----------
-    matrix : csr_array, (m, m)
-        Symmetric positive definite.
-    loads : ndarray, (m, k)
-    rtol : float
-        Of the residual of each column against its load.
-    report : callable
-        Called with the share that is done; may raise `Cancelled`.
-
-    Returns
-    -------
-    ndarray, (m, k)
-
-    Raises
-    ------
-    SolverError
-        No convergence.
+    The residual of each column falls to a share `rtol` of its load, or `SolverError` is raised. `report` is called with
+    the share of the work that is done; it may raise `Cancelled`.
     """
     with ThreadPoolExecutor(cores()) as pool:
         rows = Rows(matrix, pool, lambda: report(0.0))

@@ -80,25 +80,10 @@ class TwoGrid:
         self._factors = factorize(real.tocsr(), 2 * starts, lambda share: report("Factors", 0.8 + 0.2 * share))
 
     def solve(self, load: Array, joined: Bools, report: Progress) -> Array:
-        """Solve until no value changes by more than a thousandth of itself.
+        """Solve for a complex load, (n,), until no value changes by more than a thousandth of itself.
 
-        Parameters
-        ----------
-        load : ndarray, (n,) complex
-        joined : ndarray, (n,) bool
-            Unknowns that belong to a surface: values are compared with the largest one there.
-        report : callable
-            Called as ``report(stage, fraction)``; may raise `Cancelled`.
-
-        Returns
-        -------
-        ndarray, (n,) complex
-            Zero on components without load.
-
-        Raises
-        ------
-        SolverError
-            No convergence.
+        Values are compared with the largest one among the unknowns that belong to the same surface, (n,) bool; they are
+        zero on components without load. Without convergence `SolverError` is raised; `report` may raise `Cancelled`.
         """
         result = self._coarse(load)
         with ThreadPoolExecutor(cores()) as pool:

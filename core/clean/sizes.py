@@ -24,10 +24,7 @@ class SurfaceSize:
     def __init__(self, laplacian: LaplaceBeltrami, kind: str) -> None:
         """Prepare for one operator; kind is "area" or "volume"; `before` holds the sizes before the points move.
 
-        Raises
-        ------
-        PointCloudError
-            Normals do not enclose a volume in some component.
+        Normals that enclose no volume in some component raise `PointCloudError`.
         """
         self.laplacian, self.kind = laplacian, kind
         self.known = laplacian.component >= 0
@@ -82,10 +79,7 @@ class SurfaceSize:
 def match_size(size: Callable[[Floats], Floats], wanted: Floats, touched: Bools) -> Floats:
     """Return the scale of each component at which its size is the wanted one, by secant steps on all of them together.
 
-    Raises
-    ------
-    SolverError
-        Some component has no such scale near 1.
+    A component without such a scale near 1 raises `SolverError`.
     """
     last, scale = np.ones(len(wanted)), np.ones(len(wanted))
     error = np.where(touched, size(scale) / wanted - 1.0, 0.0)

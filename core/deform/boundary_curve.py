@@ -52,19 +52,7 @@ class BoundaryCurve:
         self._range = -p[:, 0], np.where(ends, 0.0, q[:, 0])
 
     def nearest(self, points: Floats) -> tuple[Floats, Ints]:
-        """Find the nearest positions on the curve.
-
-        Parameters
-        ----------
-        points : ndarray, (n, 3)
-
-        Returns
-        -------
-        foot : ndarray, (n, 3)
-            The nearest positions.
-        index : ndarray, (n,) int
-            The nearest points of the boundary.
-        """
+        """Find the nearest positions on the curve, (n, 3), and the nearest points of the boundary, (n,) int."""
         index = self._tree.query(points)[1]
         slope, second = self._slope[index], self._second[index]
         offset = points - self.points[index]
@@ -79,20 +67,10 @@ class BoundaryCurve:
         return self.points[index] + t[:, None] * slope + t[:, None] ** 2 * second, index
 
     def distance(self, points: Floats, normals: Floats, foot: Floats, index: Ints, boundary_normals: Floats) -> Floats:
-        """Return the distances of points from their feet along a surface, to fourth order.
+        """Return the distances of points from their feet along a surface, (n,), to fourth order.
 
-        Parameters
-        ----------
-        points, normals : ndarray, (n, 3)
-            Points of the surface and its unit normals, of any sign.
-        foot, index : ndarray
-            From `nearest`.
-        boundary_normals : ndarray, (m, 3)
-            Unit normals of the surface at the boundary's points.
-
-        Returns
-        -------
-        ndarray, (n,)
+        Normals, (n, 3), are unit vectors of any sign, as are those at the boundary's points, (m, 3); feet and indices
+        are from `nearest`.
         """
         offset = points - foot
         other = boundary_normals[index]

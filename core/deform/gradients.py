@@ -140,12 +140,7 @@ def coupled(laplacian: LaplaceBeltrami) -> Bools:
 def sums_over_steps(products: sparse.csr_array, points: Floats) -> Floats:
     """Return the sums over neighbors of w_ij (x_j - x_i)(p_j - p_i)^T, (3, 3, m), p the points at rest.
 
-    Parameters
-    ----------
-    products : csr_array, (3 m, m)
-        Of the points at rest and the weights.
-    points : ndarray, (m, 3)
-        Where they are now.
+    The products, (3 m, m), are `step_products` of these and the weights; `points`, (m, 3), are x.
     """
     # Column by column: half of the time that three at once take.
     return np.array([(products @ column).reshape(3, -1) for column in np.ascontiguousarray(points.T)])
@@ -154,12 +149,7 @@ def sums_over_steps(products: sparse.csr_array, points: Floats) -> Floats:
 def step_products(weights: sparse.coo_array, rest: Floats) -> sparse.csr_array:
     """Return the (3 m, m) matrix G with (G x)[c m + i] = sum_j w_ij (p_j - p_i)_c (x_j - x_i), for `sums_over_steps`.
 
-    Parameters
-    ----------
-    weights : coo_array, (m, m)
-        Of the steps; the diagonal does not count.
-    rest : ndarray, (m, 3)
-        The points at rest, p.
+    The diagonal of the weights, (m, m), does not count; `rest`, (m, 3), is p.
     """
     step = rest[weights.col] - rest[weights.row]
     products = []

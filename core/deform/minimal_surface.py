@@ -337,12 +337,7 @@ class _Film:
     def advance(self, before: _State, limit: float) -> tuple[_State, str]:
         """Take a step, or a fraction of it, to a surface that is curved no more than the limit.
 
-        Returns
-        -------
-        _State
-            The next one; the same if there is none.
-        str
-            Why there is none.
+        Return the next state, and an empty text; or the same state, and why there is no next one.
         """
         for halving in range(_HALVINGS + 1):
             failure = "unresolved" if before.definite else "pinching"

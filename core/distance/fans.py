@@ -58,23 +58,10 @@ class Fans:
     def refine(
         self, distance: Floats, label: Ints, held: Bools | None = None, report: Callable[[], None] = lambda: None
     ) -> tuple[Floats, Ints]:
-        """Shorten distances along pairs to those of fronts through triangles.
+        """Shorten distances along pairs, (n,), to those of fronts through triangles; return them with their labels.
 
-        Parameters
-        ----------
-        distance : ndarray, (n,)
-            Of shortest paths along pairs [L]; infinite where none leads.
-        label : ndarray, (n,) int
-            Where each path comes from.
-        held : ndarray, (n,) bool, optional
-            Points whose distances are exact.
-        report : callable
-            Called now and then; may raise `Cancelled`.
-
-        Returns
-        -------
-        distance : ndarray, (n,)
-        label : ndarray, (n,) int
+        Distances [L] are infinite where no path leads; labels, (n,) int, tell where each path comes from. Those of
+        points `held`, (n,) bool, are exact. `report` is called now and then; it may raise `Cancelled`.
         """
         known = np.isfinite(distance)
         free = np.flatnonzero(known if held is None else known & ~held)

@@ -191,10 +191,7 @@ def harmonic_field(
 def read_values(fixed: ArrayLike | None, values: ArrayLike | None, count: int) -> tuple[Ints, Floats]:
     """Return fixed points as indices (k,) and their values (k,).
 
-    Raises
-    ------
-    InvalidPointsError
-        Points or values of another shape, not finite, or two values for one point.
+    Another shape, numbers that are not finite, or two values for one point raise `InvalidPointsError`.
     """
     if fixed is None:
         fixed = np.zeros(0, dtype=int)

@@ -26,10 +26,7 @@ _ROWS = r"\((\d{1,15})L?,\s*3L?,?\s*\)"  # Python 2 wrote 200L
 def read_array(path: Path) -> PointTable:
     """Read an array (n, 3), or the one named points among several, whatever the file is called.
 
-    Raises
-    ------
-    InvalidPointsError
-        There is none.
+    Without one `InvalidPointsError` is raised.
     """
     return next((table for table, _ in array_pieces(path)), PointTable(np.empty((0, 3))))
 

@@ -68,10 +68,7 @@ def is_comment(line: str) -> bool:
 def find_rows(blocks: Blocks, path: Path) -> Rows:
     """Find the first line with three numbers, and their delimiter.
 
-    Raises
-    ------
-    InvalidPointsError
-        There is none, or too many lines precede it.
+    Where there is none, or too many lines precede it, `InvalidPointsError` is raised.
     """
     before: list[str] = []
     texts = 0

@@ -52,16 +52,9 @@ class Octree(NamedTuple):
 
 
 def read_octree(file: BinaryIO, chunks: Sequence[PackedChunk], path: Path) -> Octree | None:
-    """Read the octree of a file; None if it has none.
+    """Read the octree of an open file, which is left where it was; None if it has none.
 
-    Parameters
-    ----------
-    file : file object
-        Left where it was.
-    chunks : sequence of PackedChunk
-        Those of the file, which the nodes must be.
-    path : pathlib.Path
-        The file, for the texts of errors.
+    The nodes must be the chunks of the file, whose name is for the texts of errors.
     """
     back = file.tell()
     file.seek(_HEAD)
@@ -100,16 +93,9 @@ def _read_pages(file: BinaryIO, place: int, length: int, path: Path) -> Array:
 
 
 def records_of(file: BinaryIO, header: Any, nodes: Sequence[PackedChunk], size: int) -> Iterator[Any]:
-    """Yield the points of nodes as records of laspy.
+    """Yield the points of nodes, given in the order of the file, as records of laspy.
 
-    Parameters
-    ----------
-    file : file object
-    header : laspy.LasHeader
-    nodes : sequence of PackedChunk
-        In the order of the file.
-    size : int
-        How many points are read at once, unless one node has more.
+    So many are read at once, unless one node has more.
     """
     laspy, lazrs = import_las()
 

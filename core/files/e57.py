@@ -52,12 +52,8 @@ def read_e57(path: Path) -> PointTable:
     """Read the points of all scans of an E57 file, transformed by their poses, with all numeric fields.
 
     Each point gets the position of its scanner as a vector, if the file has it, and the number of its scan, if there
-    are several. Those that are marked as invalid are left out.
-
-    Raises
-    ------
-    InvalidPointsError
-        It is no E57 file, or broken; the text says where.
+    are several. Those that are marked as invalid are left out. A file that is no E57 file, or broken, raises
+    `InvalidPointsError`, whose text says where.
     """
     notices: list[str] = []
     tables = [*e57_scans(path, notices)]

@@ -29,16 +29,9 @@ def place_of(offset: int) -> int:
 
 
 def read_bytes(file: BinaryIO, place: int, count: int, path: Path) -> Ints:
-    """Read bytes of an open file from a place on, both without checksums, which are compared.
+    """Read so many bytes of an open file from a place on, both without checksums, which are compared.
 
-    Returns
-    -------
-    ndarray, (count,) uint8
-
-    Raises
-    ------
-    InvalidPointsError
-        The file ends before, or has changed since it was written.
+    A file that ends before, or has changed since it was written, raises `InvalidPointsError`.
     """
     first, last = place // _BODY, -(-(place + count) // _BODY)
     if last * PAGE > os.fstat(file.fileno()).st_size:
@@ -128,17 +121,10 @@ def read_streams(file: BinaryIO, place: int, end: float, widths: list[int], coun
 
 
 def unpack(stream: Ints, width: int, count: int) -> Ints:
-    """Return whole numbers of so many bits each, up to 64, the lowest bit first.
+    """Return whole numbers of so many bits each, up to 64, the lowest bit first, (count,) uint64.
 
-    Parameters
-    ----------
-    stream : ndarray, (m,) uint8
-        Eight numbers lie in as many bytes as one has bits; nine bytes more are there than those of all eights.
-    width, count : int
-
-    Returns
-    -------
-    ndarray, (count,) uint64
+    Eight numbers lie in as many bytes of the stream as one has bits; nine bytes more are there than those of all
+    eights.
     """
     result = np.empty((-(-count // 8), 8), np.uint64)
     for index in range(8):

@@ -116,12 +116,7 @@ def read_points(path: FilePath, columns: str = "", las: LasChoices = LasChoices(
 
 
 def check_size(path: Path) -> None:
-    """Refuse to read a file as a whole that does not fit the free memory: the system would end the program.
-
-    Raises
-    ------
-    NotEnoughMemoryError
-    """
+    """Raise `NotEnoughMemoryError` for a file that does not fit the free memory: the system would end the program."""
     free, needed = available_memory(), _IN_MEMORY.get(path.suffix.lower(), _TIMES) * path.stat().st_size
     if free is not None and needed > free:
         raise NotEnoughMemoryError(

@@ -48,10 +48,7 @@ class Grid(NamedTuple):
 def find_grid(path: Path) -> Grid | None:
     """Return what the header of a grid states; None for other files.
 
-    Raises
-    ------
-    InvalidPointsError
-        It is a binary grid, or its header is incomplete.
+    A binary grid, or an incomplete header, raises `InvalidPointsError`.
     """
     with open(path, "rb") as binary:
         kind = _BINARY.get(binary.read(4))
@@ -111,16 +108,9 @@ def _counts(columns: str, rows: str, path: Path) -> tuple[int, int]:
 def grid_pieces(
     path: Path, grid: Grid, size: int | None, notices: list[str]
 ) -> Iterator[tuple[PointTable, dict[str, Array]]]:
-    """Yield the cells that have data as points, in pieces or all at once, with no further columns.
+    """Yield the cells that have data as points, all at once or with a size in pieces, with no further columns.
 
-    Parameters
-    ----------
-    path : pathlib.Path
-    grid : Grid
-    size : int or None
-        None for all at once, otherwise pieces are those in which the text is read.
-    notices : list of str
-        Gets what was read, and how many cells have no data, at the end.
+    Pieces are those in which the text is read. At the end notices get what was read, and how many cells have no data.
     """
     pieces = _points(path, grid, notices)
     if size is None:

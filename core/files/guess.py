@@ -55,20 +55,9 @@ class Guess:
             triple.add(values[:, first : first + 3])
 
     def names(self, unknown: list[str], scanned: bool = True) -> list[str]:
-        """Name the columns.
+        """Name the columns r g b, alpha, nx ny nz, intensity, or by the names that are given for unknown ones.
 
-        Parameters
-        ----------
-        unknown : list of str
-            A name for each, for those that are neither.
-        scanned : bool
-            Whether a single number before colors may be an intensity: not one before the coordinates, which counts
-            points.
-
-        Returns
-        -------
-        list of str
-            r g b, alpha, nx ny nz, intensity, or the given ones.
+        A single number before colors may be an intensity if `scanned`; one before the coordinates counts points.
         """
         names = list(unknown)
         color, normal = self._best_pair()

@@ -149,13 +149,7 @@ class LasFile(NamedTuple):
 
 @contextmanager
 def opened_las(path: Path) -> Iterator[LasFile]:
-    """Open a LAS or LAZ file.
-
-    Raises
-    ------
-    PointCloudError
-        laspy or lazrs is missing, or the file is broken.
-    """
+    """Open a LAS or LAZ file; if it is broken, or laspy or lazrs is missing, raise `PointCloudError`."""
     laspy, lazrs = import_las()
     with open(path, "rb") as file:
         check_header(file, path)
@@ -175,12 +169,8 @@ def opened_las(path: Path) -> Iterator[LasFile]:
 def read_las(path: Path, las: LasChoices = LasChoices()) -> PointTable:
     """Read a LAS or LAZ file: coordinates, colors, all other columns of its format but waveforms, and extra dimensions.
 
-    Points that are flagged as withheld are left out, unless they are chosen, as are those of classes that are not.
-
-    Raises
-    ------
-    PointCloudError
-        laspy or lazrs is missing, or the file is broken.
+    Points that are flagged as withheld are left out, unless they are chosen, as are those of classes that are not. A
+    broken file raises `PointCloudError`, as where laspy or lazrs is missing.
     """
     with opened_las(path) as file:
         count, tally, done = file.reader.header.point_count, Tally(las), 0

@@ -93,10 +93,7 @@ def _text(data: bytes) -> str:
 def check_size(file: BinaryIO, header: Any, path: Path) -> list[PackedChunk]:
     """Refuse a file that is too short for its points, before there is memory for them.
 
-    Returns
-    -------
-    list of PackedChunk
-        Of compressed points; none where they are not compressed.
+    Return the chunks of compressed points; none where they are not compressed.
     """
     begin, size = header.offset_to_point_data, os.fstat(file.fileno()).st_size
     needed = header.point_count * header.point_format.size

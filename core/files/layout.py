@@ -89,16 +89,8 @@ def given_layout(columns: str, rows: Rows) -> Layout:
 def find_layout(rows: Rows, usual: dict[int, tuple[str, ...]]) -> Layout:
     """Find the layout of a text by its names, or by the values of columns.
 
-    Parameters
-    ----------
-    rows : Rows
-    usual : dict of int to tuple of str
-        Names for numbers of columns, where the text has none: colors may be normals instead.
-
-    Raises
-    ------
-    InvalidPointsError
-        By their names, no three columns are coordinates.
+    `usual` has names for numbers of columns, where the text has none: colors may be normals instead. Names by which no
+    three columns are coordinates raise `InvalidPointsError`.
     """
     numeric, textual, empty = kinds(rows)
     names = find_names(rows, numeric)

@@ -142,19 +142,7 @@ def is_known(name: str) -> bool:
 
 
 def find_places(names: Sequence[str | None], numeric: list[int]) -> Places | None:
-    """Find the columns of x y z by their names.
-
-    Parameters
-    ----------
-    names : sequence of str or None
-    numeric : sequence of int
-        Indices of the columns that hold numbers.
-
-    Returns
-    -------
-    Places or None
-        None if there are no three that could be.
-    """
+    """Find the columns of x y z by names, among those that hold numbers; None if there are no three that could be."""
     given = [name or "" for name in names]
     words = {index: _place(given[index]) for index in numeric if index < len(given)}
     found = _find_system(words)

@@ -34,10 +34,7 @@ class _Field(NamedTuple):
 def read_pcd(path: Path) -> PointTable:
     """Read the points of a PCD file with all their fields of one number; those that the sensor missed are left out.
 
-    Raises
-    ------
-    InvalidPointsError
-        It is no PCD file, or broken; the text says where.
+    A file that is no PCD file, or broken, raises `InvalidPointsError`, whose text says where.
     """
     with open(path, "rb") as file:
         fields, count, kind, viewpoint = _read_header(file, path)

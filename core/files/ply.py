@@ -73,10 +73,7 @@ class PlyVertices(NamedTuple):
 def read_ply(path: Path) -> PointTable:
     """Read the vertices of a PLY file with all their properties.
 
-    Raises
-    ------
-    InvalidPointsError
-        It is no PLY file, or broken; the text says where.
+    A file that is no PLY file, or broken, raises `InvalidPointsError`, whose text says where.
     """
     vertices = read_vertex_columns(path)
     table = from_columns(vertices.columns, path)
@@ -103,17 +100,8 @@ def read_vertex_columns(path: FilePath) -> PlyVertices:
 def ply_pieces(path: Path, size: int, notices: list[str]) -> Iterator[tuple[PointTable, dict[str, Array]]] | None:
     """Yield the vertices of a binary PLY file, so many at once, as `gather_columns` makes them.
 
-    Parameters
-    ----------
-    path : pathlib.Path
-    size : int
-    notices : list of str
-        Gets what is left out.
-
-    Returns
-    -------
-    iterator of (PointTable, dict of str to ndarray), or None
-        None where the file can only be read as a whole: it is text, or has lists at its vertices.
+    Notices get what is left out. Return None where the file can only be read as a whole: it is text, or has lists at
+    its vertices.
     """
     with open(path, "rb") as file:
         order, before, vertex, after, _, found = _read_vertex(file, path)
@@ -305,14 +293,7 @@ def _columns(rows: Array, codes: Sequence[str]) -> list[Array]:
 def write_ply(path: Path, table: PointTable, double: bool = True, faces: Sequence[Ints] = ()) -> list[str]:
     """Write a table as a binary PLY file, and return notices; see `write_vertex_columns`.
 
-    Parameters
-    ----------
-    path : pathlib.Path
-    table : PointTable
-    double : bool
-        Whether coordinates are kept in double precision.
-    faces : sequence of ndarray, (m, k) int
-        Of k corners each, as indices of points.
+    Coordinates are kept in double precision if asked for. Faces, (m, k) each, are indices of k points.
     """
     return write_vertex_columns(path, to_columns(table, double), faces=faces)
 

@@ -6,17 +6,7 @@ from ..types import Floats, Ints
 
 
 def triangles(faces: Ints, points: Floats) -> Ints:
-    """Divide faces of k corners into triangles, quads along their shorter diagonal, others into fans.
-
-    Parameters
-    ----------
-    faces : ndarray, (m, k) int
-    points : ndarray, (n, 3)
-
-    Returns
-    -------
-    ndarray, (m (k - 2), 3) int
-    """
+    """Divide faces of k corners, (m, k), into triangles, quads along their shorter diagonal, others into fans."""
     if faces.shape[1] == 4:
         places = points[faces]
         first, second = (np.linalg.norm(places[:, end] - places[:, end - 2], axis=1) for end in (2, 3))

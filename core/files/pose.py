@@ -9,19 +9,9 @@ from .table import NORMAL, SCANNER, PointTable
 
 
 def turn(table: PointTable, quaternion: Sequence[float]) -> None:
-    """Rotate points and normals of a table about the origin.
+    """Rotate points and normals of a table, in place, about the origin, by a quaternion w x y z of any length.
 
-    Parameters
-    ----------
-    table : PointTable
-        Modified in place.
-    quaternion : sequence of float
-        w x y z, of any length but zero.
-
-    Raises
-    ------
-    ValueError
-        It is zero, or not finite.
+    One that is zero, or not finite, raises ValueError.
     """
     w, x, y, z = quaternion
     square = w * w + x * x + y * y + z * z
@@ -35,13 +25,7 @@ def turn(table: PointTable, quaternion: Sequence[float]) -> None:
 
 
 def shift(table: PointTable, position: Floats) -> None:
-    """Move points by the position of their scanner, (3,), and keep it.
-
-    Raises
-    ------
-    ValueError
-        It is not finite.
-    """
+    """Move points by the position of their scanner, (3,), and keep it; one that is not finite raises ValueError."""
     if not np.isfinite(position).all():
         raise ValueError("a scanner position is invalid")
     table.points += position

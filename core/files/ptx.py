@@ -29,16 +29,9 @@ def holds_ptx(blocks: Iterator[list[str]]) -> bool:
 def read_ptx(path: Path) -> PointTable:
     """Read a PTX file: the points of all scans, transformed by their matrices, without rays that hit nothing.
 
-    Each point gets the position of its scanner as a vector, and the number of its scan, if there are several.
-
-    Returns
-    -------
-    PointTable
-
-    Raises
-    ------
-    InvalidPointsError
-        It is no PTX file, or announces another number of points than it has; the text says where.
+    Each point gets the position of its scanner as a vector, and the number of its scan, if there are several. A file
+    that is no PTX file, or announces another number of points than it has, raises `InvalidPointsError`, whose text says
+    where.
     """
     scans = [(values, center, missed) for values, center, missed, _ in _scans(path)]
     return _join([(values, center) for values, center, _ in scans], sum(missed for *_, missed in scans), path)

@@ -34,10 +34,7 @@ class Range(NamedTuple):
 def ranges_of(pieces: ColumnPieces) -> tuple[int, dict[str, Range]]:
     """Return how many rows pieces have together, and the range of each column.
 
-    Raises
-    ------
-    InvalidPointsError
-        Pieces of different columns.
+    Pieces of different columns raise `InvalidPointsError`.
     """
     count, found = 0, dict[str, Range]()
     for columns in pieces():

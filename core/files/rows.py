@@ -19,17 +19,9 @@ _HARMLESS = 64e6  # ... or fewer bytes than this
 
 
 def read_records(file: BinaryIO, begin: int, record: np.dtype[Any], count: int, path: Path) -> Array:
-    """Read records that begin at a place in an open file.
+    """Read so many records, as the header names, that begin at a place in an open file.
 
-    Parameters
-    ----------
-    file : file object
-    begin : int
-    record : numpy.dtype
-    count : int
-        How many the header names; a shorter file is refused before there is memory for them.
-    path : pathlib.Path
-        The file, for the texts of errors.
+    A shorter file is refused before there is memory for them; its name is for the texts of errors.
     """
     return next(record_blocks(file, begin, record, count, path, max(count, 1)), np.empty(0, record))
 

@@ -179,13 +179,7 @@ def depth_notices(colors: Array, path: Path) -> Iterator[str]:
 def to_columns(table: PointTable, double: bool = True, full: float = 255.0) -> dict[str, Array]:
     """Return the columns of a table by the names of files, numbers as they are; the reverse of `from_columns`.
 
-    Parameters
-    ----------
-    table : PointTable
-    double : bool
-        Whether coordinates stay in double precision.
-    full : float
-        The number of a full color.
+    Coordinates stay in double precision if asked for; `full` is the number of a full color.
     """
     columns = dict(zip(AXES, (table.points if double else table.points.astype(np.float32)).T, strict=True))
     attributes = dict(table.attributes)
@@ -213,16 +207,9 @@ def _free_name(name: str, columns: dict[str, Array]) -> str:
 
 
 def without_missed(table: PointTable, path: Path) -> PointTable:
-    """Return a table without the points that have no valid coordinates: sensors write NaN for rays without a hit.
+    """Return a table, modified in place, without the points that have no valid coordinates, which a notice tells.
 
-    Other programs write the largest number.
-
-    Parameters
-    ----------
-    table : PointTable
-        Modified in place, and gets a notice.
-    path : pathlib.Path
-        The file, for the texts.
+    Sensors write NaN for rays without a hit, other programs the largest number.
     """
     missed = Missed()
     kept = missed.add(table.points)

@@ -41,16 +41,10 @@ _SCAN_NAMES = {  # of the columns of PTS files
 def read_columns(path: Path, columns: str = "") -> PointTable:
     """Read a text file with a point a line.
 
-    Columns are separated by semicolons, tabs, bars, white space or commas; beside commas, numbers have decimal
-    points, otherwise points or commas. A line before the first point, marked as a comment or not, may name the columns;
-    without names the first three are x y z, and others colors or normals if they look like them. Grids of
-    heights, and a PTX file by another name, are read as such.
-
-    Parameters
-    ----------
-    path : pathlib.Path
-    columns : str
-        Names of the columns in their order; see `given_layout`. Empty to find them.
+    Columns are separated by semicolons, tabs, bars, white space or commas; beside commas, numbers have decimal points,
+    otherwise points or commas. A line before the first point, marked as a comment or not, may name the columns; without
+    names the first three are x y z, and others colors or normals if they look like them. Names may be given, as of
+    `given_layout`. Grids of heights, and a PTX file by another name, are read as such.
     """
     return _whole(column_pieces, path, columns)
 
@@ -75,24 +69,11 @@ def _colored(pieces: Pieces, path: Path, notices: list[str]) -> PointTable:
 
 
 def column_pieces(path: Path, size: int | None, notices: list[str], columns: str = "") -> Pieces | None:
-    """Yield the points of a text file, so many at once, as `gather_columns` makes them.
+    """Yield the points of a text file, so many at once or without a size all, as `gather_columns` makes them.
 
-    What the columns are is decided by all rows, which are read for that first.
-
-    Parameters
-    ----------
-    path : pathlib.Path
-    size : int or None
-        None for all at once.
-    notices : list of str
-        Gets what is guessed and left out.
-    columns : str
-        As of `read_columns`.
-
-    Returns
-    -------
-    iterator of (PointTable, dict of str to ndarray), or None
-        None where the file is a PTX file; see `ptx_pieces`.
+    What the columns are is decided by all rows, which are read for that first, unless they are named as of
+    `read_columns`; notices get what is guessed and left out. Return None where the file is a PTX file; see
+    `ptx_pieces`.
     """
     return _pieces(partial(read_text, path, _SKIPPED), path, size, notices, columns, {})
 
@@ -279,13 +260,8 @@ def _vertex_names(rows: Rows) -> list[str]:
 def write_columns(path: Path, pieces: ColumnPieces, delimiter: str = " ") -> None:
     """Write columns as text, a point a line, with their names before them.
 
-    Parameters
-    ----------
-    path : pathlib.Path
-    pieces : callable
-        Doubles among their coordinates are written with the digits of double precision.
-    delimiter : str
-        With white space the line of names begins with #, which readers of XYZ files skip.
+    Doubles among the coordinates are written with the digits of double precision. With white space as delimiter the
+    line of names begins with #, which readers of XYZ files skip.
     """
     ranges = ranges_of(pieces)[1]
     line = delimiter.join(_text_format(name, found) for name, found in ranges.items()) + "\n"

@@ -10,21 +10,12 @@ from .patches import Patch
 
 
 def arc_length(cloud: Cloud) -> Floats:
-    """Return the length of the arc that joins each pair within the surface.
+    """Return the length of the arc that joins each pair within the surface, (p,).
 
     That of `arc_squared`, or of `bent_ways` where an edge is near, and ``g max(r^2 - a^2, 0)`` more: the path up and
     down over a roughness finer than the normals resolve, of mean squared slope g, the mean of both ends. Between points
-    one spacing a apart the chord is that path.
-
-    Parameters
-    ----------
-    cloud : Cloud
-        Of m points, with p pairs. The second normal is flipped to the first one's side, pair by pair, by the normals of
-        all neighbors: signs do not matter.
-
-    Returns
-    -------
-    ndarray, (p,)
+    one spacing a apart the chord is that path. The second normal is flipped to the first one's side, pair by pair, by
+    the normals of all neighbors: signs do not matter.
     """
     pairs, steep = cloud.pairs, cloud.squared_slope.any()
     result = np.empty(len(pairs.first))

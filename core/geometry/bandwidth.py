@@ -105,16 +105,9 @@ def _widening(
 
 
 def mean_gaps(nearest: Nearest, radius: Floats, power: int) -> Floats:
-    """Return how wide the gaps around every point are, (m,): the radii of the Voronoi cells, in the mean.
+    """Return how wide the gaps around every point are, (m,): the radii of the Voronoi cells, (m,), in the mean.
 
-    Parameters
-    ----------
-    nearest : Nearest
-        Of m points.
-    radius : ndarray, (m,)
-        Of each point's cell.
-    power : int
-        Of the mean: in the eighth the widest gaps decide.
+    In the mean of a high power, such as the eighth, the widest gaps decide.
     """
     radius = np.minimum(radius, GAP * nearest.spacing)
     return nearest.averaged(radius**power, ROUNDS) ** (1.0 / power)
@@ -133,12 +126,7 @@ def depth(nearest: Nearest, inside: Floats) -> Floats:
 def neighbor_distance(tree: cKDTree, neighbors: int, component: Ints | None) -> Floats:
     """Return how far the n-th neighbor of every point is, (m,); in components of fewer points, how far it would be.
 
-    Parameters
-    ----------
-    tree : scipy.spatial.cKDTree
-        Of m points, whose components are further apart than that.
-    neighbors : int
-    component : ndarray, (m,) int, optional
+    Components are further apart than that in the tree.
     """
     # The tree counts a point as its own first neighbor.
     distance: Floats = tree.query(tree.data, k=[min(neighbors + 1, tree.n)], workers=cores())[0][:, 0]

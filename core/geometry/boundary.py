@@ -54,26 +54,12 @@ class Boundary:
         return self.distance[:, 0] < SUPPORT * lengths
 
     def parting(self, tree: cKDTree, normals: Floats, first: Ints, second: Ints, gaps: Floats) -> Ints:
-        """Find the pairs of points between which the surface ends, and goes on after a gap, such as a slit.
+        """Return which pairs of points the surface ends between, to go on after a gap, such as a slit, (k,) int.
 
         From either end the other one lies beyond a boundary there, and halfway between both crossings the straight line
         is well beyond both; or some place on the arc between them is near no point. Where neither end sees the other
-        beyond a boundary, as in the mouth of a slit, it has to be farther from all points.
-
-        Parameters
-        ----------
-        tree : cKDTree
-            Of the m points.
-        normals : ndarray, (m, 3)
-            Unit normals of any sign.
-        first, second : ndarray, (p,) int
-        gaps : ndarray, (m,)
-            How wide the gaps between points are.
-
-        Returns
-        -------
-        ndarray, (k,) int
-            Which of the pairs.
+        beyond a boundary, as in the mouth of a slit, it has to be farther from all points. Pairs are (p,) each,
+        normals, (m, 3), of any sign, and `gaps`, (m,), how wide those between points are.
         """
         near = np.isfinite(self.distance[:, 0])
         rows = np.flatnonzero(near[first] | near[second]) if near.any() else np.zeros(0, dtype=int)
@@ -118,24 +104,12 @@ def no_boundary(count: int) -> Boundary:
 
 
 def find_boundary(nearest: Nearest, oriented: Floats, gaps: Floats) -> Bools:
-    """Find the points at which the surface ends.
+    """Find the points at which the surface ends, (m,) bool.
 
     Candidates are points around which the directions of the neighbors leave a wide gap, and far into which there is
     nothing. Where neighbors lie off a point's sheet or face elsewhere, the surface does not end but goes on past an
-    edge. Candidates that could not surround the empty place before them are dropped, as chance.
-
-    Parameters
-    ----------
-    nearest : Nearest
-        Of m points.
-    oriented : ndarray, (m, 3)
-        Unit normals whose signs agree.
-    gaps : ndarray, (m,)
-        How wide the gaps between points are: no boundary is found around those that are not much wider.
-
-    Returns
-    -------
-    ndarray, (m,) bool
+    edge. Candidates that could not surround the empty place before them are dropped, as chance. Signs of the normals,
+    (m, 3), agree; no boundary is found around gaps that are not much wider than those between points, (m,).
     """
     points = nearest.points
     result = np.zeros(len(points), dtype=bool)
@@ -208,24 +182,11 @@ def _tangents(directions: Floats, normals: Floats) -> Floats:
 
 
 def measure_boundary(nearest: Nearest, normals: Floats, at_boundary: Bools) -> Boundary:
-    """Measure how far the points are from the boundary.
+    """Measure how far the points are from the boundary, by unit normals, (m, 3), and the points at it, (m,) bool.
 
     Around every boundary point the boundary's course is a parabola through the boundary points next to it, on one side
     of a corner, moved outwards by their scatter: at random, points lie up to a spacing inside the boundary; of points
     exactly on it the scatter is zero.
-
-    Parameters
-    ----------
-    nearest : Nearest
-        Of m points.
-    normals : ndarray, (m, 3)
-        Unit normals.
-    at_boundary : ndarray, (m,) bool
-        Points at the boundary.
-
-    Returns
-    -------
-    Boundary
     """
     boundary, reach = no_boundary(len(normals)), _REACH * nearest.spacing
     rows = np.flatnonzero(at_boundary)
@@ -380,18 +341,7 @@ def _parabola(t: Floats, e: Floats, weight: Floats) -> tuple[Floats, Floats]:
 def given_boundary(nearest: Nearest, normals: Floats, distance: Floats) -> Boundary:
     """Take distances to the boundary as they are, and find the boundary's direction and curvature from them.
 
-    Parameters
-    ----------
-    nearest : Nearest
-        Of m points.
-    normals : ndarray, (m, 3)
-        Unit normals.
-    distance : ndarray, (m,)
-        Distance to the boundary along the surface; infinite far from any.
-
-    Returns
-    -------
-    Boundary
+    Distances, (m,), are along the surface, and infinite far from any boundary; normals, (m, 3), are unit vectors.
     """
     boundary = no_boundary(len(distance))
     boundary.distance[:, 0] = distance

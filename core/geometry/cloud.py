@@ -141,25 +141,9 @@ def read_cloud(
     left_out: ArrayLike = (),
     agreed: Agreed | None = None,
 ) -> Cloud:
-    """Go from coordinates to pairs.
+    """Go from coordinates [L], (n, 3), to pairs; for the other arguments see `build_laplacian`.
 
-    Parameters
-    ----------
-    points : array_like, (n, 3)
-        Coordinates [L].
-    options : LaplacianOptions
-        Settings.
-    normals, boundary, boundary_distance, progress, left_out, agreed
-        See `build_laplacian`.
-
-    Returns
-    -------
-    Cloud
-
-    Raises
-    ------
-    PointCloudError
-        No sound neighborhoods.
+    Points without sound neighborhoods raise `PointCloudError`.
     """
     report = progress or (lambda stage, fraction: None)
     report("Normals", 0.0)
@@ -185,22 +169,8 @@ def measure_surface(
 ) -> Cloud:
     """Go from quadrics to pairs.
 
-    Parameters
-    ----------
-    surface : Surface
-        Of m points.
-    options : LaplacianOptions
-        Settings.
-    counts : tuple of int
-        How many points there were at first, and how many distinct ones among them, for the notices.
-    given : ndarray, (m, 3), optional
-        Unit normals to use as they are.
-    boundary, boundary_distance, report
-        See `build_laplacian`.
-
-    Returns
-    -------
-    Cloud
+    `counts` are how many points there were at first, and how many distinct ones among them, for the notices; `given`,
+    (m, 3), are unit normals to use as they are. For the other arguments see `build_laplacian`.
     """
     sample, quadrics, nearest = surface.sample, surface.quadrics, surface.sample.nearest
     decisions = sample.decisions
@@ -290,14 +260,8 @@ def read_surface(
 ) -> tuple[ScaledPoints, Surface]:
     """Go from coordinates, checked, to quadrics; of some rows of them alone, if these are named.
 
-    What is agreed on for more points than these is taken as it is.
-
-    Returns
-    -------
-    ScaledPoints
-        All distinct points.
-    Surface
-        Of those that take part.
+    What is agreed on for more points than these is taken as it is. Return all distinct points, and the surface of those
+    that take part.
     """
     decisions = Decisions(agreed)
     scaled = scale_points(points if kept is None else points[kept], decisions)
@@ -324,25 +288,10 @@ def gather(scaled: ScaledPoints, decisions: Decisions) -> Sample:
 
 
 def leave_outliers(scaled: ScaledPoints, report: Report = lambda: None, decisions: Decisions | None = None) -> Sample:
-    """Leave out distinct points that do not lie on the surface of their neighbors.
+    """Leave out distinct points that do not lie on the surface of their neighbors; return a sample of one component.
 
-    Parameters
-    ----------
-    scaled : ScaledPoints
-    report : callable
-        Called between its two stages; may raise `Cancelled`.
-    decisions : Decisions, optional
-        For the sample; all are taken by these points if not given.
-
-    Returns
-    -------
-    Sample
-        Of one component.
-
-    Raises
-    ------
-    ComponentError
-        Too few are left.
+    Without decisions for the sample they are taken by these points. `report` is called between the two stages; it may
+    raise `Cancelled`. If too few points are left, `ComponentError` is raised.
     """
     sample = gather(scaled, decisions or Decisions())
     report()
@@ -356,21 +305,9 @@ def drop_outliers(sample: Sample) -> Sample:
 
 
 def divide_components(sample: Sample) -> Sample:
-    """Divide points into components that gaps separate, and leave out those of too few points.
+    """Divide a sample into components that gaps separate, and leave out those of too few points.
 
-    Parameters
-    ----------
-    sample : Sample
-        Of one component.
-
-    Returns
-    -------
-    Sample
-
-    Raises
-    ------
-    ComponentError
-        Too few are left.
+    If too few points are left, `ComponentError` is raised.
     """
     decisions = sample.decisions
     usual = decisions.settle("reach", lambda: float(np.median(gap_reach(sample.nearest))))
@@ -385,10 +322,6 @@ def fit_surface(sample: Sample, sheets: bool, before: Surface | None = None, cha
 
     With `before`, the surface before some points moved, only points in `changed` are fitted again: those that moved or
     have neighbors that did.
-
-    Returns
-    -------
-    Surface
     """
     nearest = sample.nearest
     if sample.decisions.whole:
@@ -409,12 +342,7 @@ def remove_noise(surface: Surface, options: LaplacianOptions, near: Floats | Non
     """Move points onto the surface that their neighbors describe, where the options or the noise ask for it.
 
     Each round measures again only points that the last one moved, and their neighbors. The first one takes
-    `near_misfit`, (m,), if that is known.
-
-    Returns
-    -------
-    Surface
-        The same one where nothing is to be done.
+    `near_misfit`, (m,), if that is known. Where nothing is to be done the same surface is returned.
     """
     if options.projection == "off":
         return surface
@@ -455,14 +383,7 @@ def _median_in_volumes(surface: Surface, noise: Floats, filling: Bools, rounds: 
 
 
 def _project(surface: Surface, noise: Floats, moving: Bools) -> tuple[Surface, Bools]:
-    """Move some points onto quadrics through their neighbors.
-
-    Returns
-    -------
-    Surface
-    ndarray, (m,) bool
-        Points that have moved, or have neighbors that did.
-    """
+    """Move some points onto quadrics through their neighbors; return also which moved, or have neighbors that did."""
     sample, nearest = surface.sample, surface.sample.nearest
     smallest = sample.decisions.settle("smallest", lambda: int(np.bincount(sample.component).min()))
     points, rows = nearest.points.copy(), np.flatnonzero(moving)
@@ -476,15 +397,8 @@ def _project(surface: Surface, noise: Floats, moving: Bools) -> tuple[Surface, B
 def divide_sheets(surface: Surface) -> Surface:
     """Divide components into disjoint sheets, and leave out points that lie off all of them.
 
-    Returns
-    -------
-    Surface
-        The same one where there is nothing to divide.
-
-    Raises
-    ------
-    ComponentError
-        Too few points are left.
+    Where there is nothing to divide the same surface is returned. If too few points are left, `ComponentError` is
+    raised.
     """
     sample, fitted = surface.sample, surface.sheets
     sheets = sample.decisions.label(
@@ -538,27 +452,10 @@ def locate_boundary(
     boundary: ArrayLike | None = None,
     boundary_distance: ArrayLike | None = None,
 ) -> Boundary:
-    """Detect the boundary of the surface, or take the caller's.
+    """Detect the boundary of the surface, or take the caller's, as of `build_laplacian`.
 
-    Parameters
-    ----------
-    sample : Sample
-        Of m points.
-    oriented : ndarray, (m, 3)
-        Unit normals whose signs agree.
-    gaps : ndarray, (m,), optional
-        From `mean_gaps`, to look for the boundary where neither of the others is given.
-    boundary, boundary_distance
-        The caller's, see `build_laplacian`.
-
-    Returns
-    -------
-    Boundary
-
-    Raises
-    ------
-    InvalidPointsError
-        A boundary that does not fit the points, or names too few of them.
+    It is detected by unit normals, (m, 3), whose signs agree, and the `mean_gaps`, (m,). A given one that does not fit
+    the points, or names too few of them, raises `InvalidPointsError`.
     """
     scaled, nearest = sample.scaled, sample.nearest
     distance = None

@@ -29,23 +29,12 @@ def gap_reach(nearest: Nearest) -> Floats:
 
 
 def label_components(nearest: Nearest, usual: float | None = None) -> Ints:
-    """Number the components of the cloud, which gaps separate.
+    """Number the components of the cloud, which gaps separate, (m,) int.
 
     Points are joined to their forty neighbors, as points may crowd along lines, except over gaps far wider than the
     spacing at the nearer end; components of some size are joined over gaps that are no wider than the spacing of the
-    sparser one would let expect.
-
-    Parameters
-    ----------
-    nearest : Nearest
-        Of m points.
-    usual : float, optional
-        The median of `gap_reach`, if these are not all the points.
-
-    Returns
-    -------
-    ndarray, (m,) int
-        The largest component is 0. Those of fewer points than a neighborhood has, 41, which get no operator, are -1.
+    sparser one would let expect. `usual` is the median of `gap_reach`, if these are not all the points. The largest
+    component is 0. Those of fewer points than a neighborhood has, 41, which get no operator, are -1.
     """
     index = nearest.index[:, 1:]
     usual = float(np.median(gap_reach(nearest))) if usual is None else usual

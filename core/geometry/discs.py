@@ -22,21 +22,8 @@ def disc_radii(nearest: Nearest, normals: Floats, cells: Cells) -> Floats:
 
     A cell reaches into the empty disc around its furthest corner. Where no point is on the other side of that, the
     surface ends, and the cell is cut off. What a cell loses that is wider than three spacings, such as between dense
-    points and sparse ones, the disc of a sparse point covers.
-
-    Parameters
-    ----------
-    nearest : Nearest
-        Of m points.
-    normals : ndarray, (m, 3)
-        Those that the cells were measured with.
-    cells : Cells
-        Of the points.
-
-    Returns
-    -------
-    ndarray, (m,)
-        At most three times the spacing around the point.
+    points and sparse ones, the disc of a sparse point covers. No disc is larger than three times the spacing around it.
+    Normals, (m, 3), are those that the cells were measured with.
     """
     usual, radii = np.median(nearest.spacing[nearest.index[:, : FEW + 1]], axis=1), cells.radius.copy()
     spacing = np.maximum(usual, nearest.spacing)  # of a sparse point beside dense ones its own

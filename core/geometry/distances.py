@@ -79,19 +79,10 @@ def circle_arc(chord: Floats, sine: Floats) -> Floats:
 def measure_squared_slope(nearest: Nearest, normals: Floats) -> Floats:
     """Measure the slopes between neighboring points that are too fine for the normals, which are fitted to many.
 
-    Parameters
-    ----------
-    nearest : Nearest
-        Of m points.
-    normals : ndarray, (m, 3)
-        Unit normals of any sign.
-
-    Returns
-    -------
-    ndarray, (m,)
-        Mean square of the slope of the chords to the eight nearest neighbors against the mean normal of their ends,
-        averaged over the neighborhood. Of fourth order in the spacing on a smooth surface. Sharp edges, where normals
-        change too fast between neighbors to be right, do not count: arcs make up for them already.
+    Return the mean square of the slope, (m,), of the chords to the eight nearest neighbors against the mean normal of
+    their ends, averaged over the neighborhood. It is of fourth order in the spacing on a smooth surface. Sharp edges,
+    where normals change too fast between neighbors to be right, do not count: arcs make up for them already. Normals,
+    (m, 3), may have any sign.
     """
 
     def measure(part: slice) -> Floats:
@@ -110,17 +101,8 @@ def measure_squared_slope(nearest: Nearest, normals: Floats) -> Floats:
 def heights_of_ends(chord: Floats, normals: Floats, rows: Ints, other: Ints) -> tuple[Floats, Floats, Floats]:
     """Return what `pair_heights` does, for chords from some points, (k,) int, to others, (k, views) int.
 
-    Parameters
-    ----------
-    chord : ndarray, (3, k, views)
-        Of `chords`.
-    normals : ndarray, (m, 3)
-    rows, other : ndarray of int
-
-    Returns
-    -------
-    cosine, left, right : ndarray, (k, views)
-        Cosines of the normals of both ends, and the heights of the chords along the first and along the second.
+    These are cosines of the normals, (m, 3), of both ends, and heights of the `chords`, (3, k, views), along the first
+    and along the second, (k, views) each.
     """
     cosine, left, right = np.zeros((3, *other.shape))
     for step, normal in zip(chord, normals.T, strict=True):
@@ -136,17 +118,8 @@ def pair_heights(
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Return the chords of pairs, their heights along the first normal and along the second, and the normals' cosine.
 
-    Parameters
-    ----------
-    first, second : callable
-        Return quantities of points, (..., m), at the first and at the second point of each of p pairs, (..., p).
-    points, normals : ndarray, (3, m)
-        One row for each coordinate.
-
-    Returns
-    -------
-    chord : ndarray, (3, p)
-    left, right, cosine : ndarray, (p,)
+    `first` and `second` return quantities of points, (..., m), at the first and at the second point of each of p pairs,
+    (..., p). Points and normals, (3, m), have a row for each coordinate, as have chords, (3, p).
     """
     chord = second(points) - first(points)
     left, right = first(normals), second(normals)

@@ -65,27 +65,13 @@ class Doubt(IntEnum):
 
 
 def likely_causes(nearest: Nearest, normals: Floats, cells: Cells, scatter: Floats) -> Ints:
-    """Tell what would be wrong at every point, if its results should turn out to be in doubt.
+    """Tell what would be wrong at every point, (m,) of `Doubt`, if its results should turn out to be in doubt.
 
-    Parameters
-    ----------
-    nearest : Nearest
-        Of m points.
-    normals : ndarray, (m, 3)
-        Unit normals of any sign.
-    cells : Cells
-        Of the points.
-    scatter : ndarray, (2, m)
-        Residuals of the fit to all neighbors, and of that to those on the point's own sheet, before noise was smoothed,
-        in spacings: from `mean_misfits`.
-
-    Returns
-    -------
-    ndarray, (m,) int
-        Of `Doubt`. Where the fit to all neighbors has a large residual, but that to the own sheet has not, there are
-        several sheets. Otherwise a residual above `FILLING`, which no shape has, is noise if the normals agree once it
-        is smoothed, and no surface if they do not. Where it is small, points are in rows if cells are long and narrow,
-        or else too few.
+    `scatter`, (2, m), are the `mean_misfits` of the fit to all neighbors, and of that to those on the point's own
+    sheet, before noise was smoothed, in spacings. Where the fit to all neighbors has a large residual, but that to the
+    own sheet has not, there are several sheets. Otherwise a residual above `FILLING`, which no shape has, is noise if
+    the normals agree once it is smoothed, and no surface if they do not. Where it is small, points are in rows if cells
+    are long and narrow, or else too few.
     """
     missed, own = scatter
     filling = missed > FILLING

@@ -66,15 +66,8 @@ def find_sides(nearest: Nearest, quadrics: Quadrics) -> Sides:
 
     Across an edge normals differ more and more with each such fit, on each side they agree; where the surface is round
     or noisy the fit stays much the same. A point next to the edge may end between both sides: in the end it takes the
-    normal of the neighbor whose quadric fits best, to this point and to that neighbor's own side. How sure
-    an edge is follows from the share of the misfit that is left, both per degree of freedom of their fits.
-
-    Parameters
-    ----------
-    nearest : Nearest
-        Of m points.
-    quadrics : Quadrics
-        Of the points.
+    normal of the neighbor whose quadric fits best, to this point and to that neighbor's own side. How sure an edge is
+    follows from the share of the misfit that is left, both per degree of freedom of their fits.
     """
     rows = np.flatnonzero(quadrics.misfit > LEFT * nearest.spacing)
     found, sharp = quadrics.take(np.arange(len(quadrics.misfit))), np.zeros(len(quadrics.misfit))
@@ -101,14 +94,8 @@ def _refit(
 ) -> tuple[Bools, Quadrics, Floats]:
     """Fit quadrics to those neighbors of some points whose last normals agree with theirs, or with one beside them.
 
-    Returns
-    -------
-    ndarray, (k,) bool
-        Which of the points have enough such neighbors.
-    Quadrics
-        Of these points.
-    ndarray, (k,)
-        How sure an edge is near each, 0 without enough.
+    Return which of the k points have enough such neighbors, the quadrics of these, and how sure an edge is near each of
+    the k points, 0 without enough.
     """
     index = nearest.index[rows]
     toward = found.normals[_closest(nearest, found, rows) if beside else rows]

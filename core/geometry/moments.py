@@ -68,21 +68,8 @@ def least_error(
 
     Each point has the weights of the kernel times ``exp(p(u))``, with the quadratic polynomial p of the offset u that
     meets its moments best, as in `balance_weights`, but for itself alone: no other point has a say. The problem is
-    convex in the five coefficients, and solved by Newton's method.
-
-    Parameters
-    ----------
-    nearest : Nearest
-        Of m points.
-    normals : ndarray, (m, 3)
-        Unit normals of any sign.
-    areas : ndarray, (m,)
-        Of the points.
-    boundary : Boundary
-    lengths : ndarray, (m,)
-        Smoothing lengths.
-    rows : ndarray, (k,) int
-        Of which points; zero where the kernel holds more than 160 others.
+    convex in the five coefficients, and solved by Newton's method. Normals, (m, 3), may have any sign; areas and
+    smoothing lengths are (m,). The residual is zero where the kernel holds more than 160 others.
     """
     result, tangents = np.zeros(len(rows)), frames(normals)[:, :, 1:].transpose(2, 1, 0).copy()
     edges, near = EdgeTerms(boundary, lengths, tangents), boundary.reached(lengths)

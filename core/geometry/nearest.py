@@ -110,16 +110,8 @@ class Nearest:
     def renewed(self, points: Floats, changed: Bools, kept: Bools | None = None) -> Nearest:
         """Return the neighbors of the same points at other places, searched for only where they may be others.
 
-        Quadrics that are known stay so, and are fitted again there.
-
-        Parameters
-        ----------
-        points : ndarray, (k, 3)
-            Of all m points, or of those kept.
-        changed : ndarray, (m,) bool
-            Around which points something has moved against them, or is gone.
-        kept : ndarray, (m,) bool, optional
-            Points that are not left out; all if not given.
+        Quadrics that are known stay so, and are fitted again there: around points in `changed`, (m,) bool, something
+        has moved against them, or is gone. Places are those of all m points, or of those `kept`, (m,) bool.
         """
         width = self.index.shape[1]
         if len(points) < width:

@@ -26,18 +26,9 @@ def near_misfit(nearest: Nearest, rows: Ints | None = None) -> Floats:
 
 
 def mean_misfits(nearest: Nearest, *misfits: Floats) -> Floats:
-    """Return the geometric means of misfits of quadrics over the neighborhood, in spacings.
+    """Return the geometric means of misfits of quadrics, (m,) each, over the neighborhood, in spacings, row by row.
 
-    Parameters
-    ----------
-    nearest : Nearest
-        Of m points.
-    *misfits : ndarray, (m,)
-
-    Returns
-    -------
-    ndarray, (k, m)
-        Of the k given ones. An edge that runs through a neighborhood has little weight.
+    An edge that runs through a neighborhood has little weight.
     """
     logarithms = np.log(np.maximum(np.stack(misfits, axis=1) / nearest.spacing[:, None], 1e-12))
     means: Floats = np.exp(nearest.averaged(logarithms, ROUNDS // 2).T)
@@ -45,23 +36,13 @@ def mean_misfits(nearest: Nearest, *misfits: Floats) -> Floats:
 
 
 def noise_level(nearest: Nearest, near: Floats, mixed: Floats, misfit: Floats) -> Floats:
-    """Measure the noise around every point as a share of the spacing.
+    """Measure the noise around every point as a share of the spacing, (m,), by `mean_misfits`.
 
-    Parameters
-    ----------
-    nearest : Nearest
-        Of m points.
-    near, mixed, misfit : ndarray, (m,)
-        Of quadrics through 20 neighbors, through 40, and through those of 40 that lie on the point's own sheet: where
-        the last is much less, there are several sheets and no noise.
-
-    Returns
-    -------
-    ndarray, (m,)
-        The misfit of a quadric through 20 neighbors; zero where it is next to nothing, or where a quadric through
-        40 fits so much worse that it is shape, not noise, that it misses. No shape is missed by as much as `FILLING`.
-        All are `mean_misfits`: an edge that runs through the neighborhood is no noise. The majority of the neighbors
-        decides.
+    These are of quadrics through 20 neighbors, through 40, and through those of 40 that lie on the point's own sheet:
+    where the last is much less, there are several sheets and no noise. It is the misfit of a quadric through 20
+    neighbors; zero where it is next to nothing, or where a quadric through 40 fits so much worse that it is shape, not
+    noise, that it misses. No shape is missed by as much as `FILLING`. An edge that runs through the neighborhood is no
+    noise. The majority of the neighbors decides.
     """
     few, many, own = mean_misfits(nearest, near, mixed, misfit)
     noisy = (few > _LEAST) & (few < _SHAPE * own) & ((few > FILLING) | (many < _SHAPE * few))
@@ -69,22 +50,10 @@ def noise_level(nearest: Nearest, near: Floats, mixed: Floats, misfit: Floats) -
 
 
 def project_points(tree: cKDTree, rows: Ints, noise: Floats, smallest: int | None = None) -> Floats:
-    """Move some points onto quadrics through their neighbors.
+    """Move some points, (k,) int, onto quadrics through their neighbors; return where they are then, (k, 3).
 
-    Parameters
-    ----------
-    tree : cKDTree
-        Of m points; components stand far apart in it.
-    rows : ndarray, (k,) int
-        Which points to move.
-    noise : ndarray, (m,)
-        As a share of the spacing: little noise needs few neighbors.
-    smallest : int, optional
-        Points of the smallest component; there is one if not given.
-
-    Returns
-    -------
-    ndarray, (k, 3)
+    Components stand far apart in the tree. Little noise, (m,) as a share of the spacing, needs few neighbors.
+    `smallest` is how many points the smallest component has; there is one if not given.
     """
     smallest = tree.n if smallest is None else min(smallest, tree.n)
     # A quadric has six coefficients.

@@ -20,10 +20,7 @@ _LEVEL = 0.2  # mean cosine between a sheet's normals and the vertical from whic
 def unit_normals(normals: ArrayLike, count: int) -> Floats:
     """Check given normals and scale them to unit length.
 
-    Raises
-    ------
-    InvalidPointsError
-        Not (count, 3) finite numbers, or some of them zero.
+    If they are not (count, 3) finite numbers, or some are zero, `InvalidPointsError` is raised.
     """
     normals = as_array(normals, "Normals")
     if normals.shape != (count, 3) or normals.dtype.kind not in "iuf":
@@ -41,20 +38,7 @@ def unit_normals(normals: ArrayLike, count: int) -> Floats:
 
 
 def orient_outwards(nearest: Nearest, normals: Floats) -> Floats:
-    """Flip normals so that neighbors agree, outwards where the cloud encloses a volume.
-
-    Parameters
-    ----------
-    nearest : Nearest
-        Of m points.
-    normals : ndarray, (m, 3)
-        Unit normals of arbitrary sign.
-
-    Returns
-    -------
-    ndarray, (m, 3)
-        The same normals with consistent signs, each component as `outer_signs` has it.
-    """
+    """Flip unit normals, (m, 3), so that neighbors agree, each component outwards as of `outer_signs`."""
     normals, tree = propagate_signs(nearest, normals)
     component = connected_components(tree, directed=False)[1]
     return normals * outer_signs(nearest.points, normals, component)[component, None]
@@ -65,20 +49,7 @@ def outer_signs(points: Floats, normals: Floats, part: Ints, weight: Floats | No
 
     A body, a bowl, or what a scanner sees of a body bulges to its outer side. Terrain does not: its hills and pits are
     low against its width. It hardly overhangs, though, so that nearly all of it faces up or down, and up is outside.
-
-    Parameters
-    ----------
-    points, normals : ndarray, (m, 3)
-        Normals that agree within each part.
-    part : ndarray, (m,) int
-        Number of the part that each point belongs to.
-    weight : ndarray, (m,), optional
-        Areas, up to a factor; alike where not given.
-
-    Returns
-    -------
-    ndarray, (parts,)
-        1 or -1.
+    Normals, (m, 3), agree within each part; parts, (m,), are numbers; weights, (m,), areas up to a factor.
     """
     weight = np.ones(len(points)) if weight is None else weight
 
@@ -93,12 +64,7 @@ def outer_signs(points: Floats, normals: Floats, part: Ints, weight: Floats | No
 def side_sums(offset: Floats, normals: Floats, part: Ints, weight: Floats) -> Floats:
     """Return the sums over each part by which its outer side is known, (parts, 10); those of divided parts add up.
 
-    Parameters
-    ----------
-    offset, normals : ndarray, (m, 3)
-        Offsets from any place, which is best near the center of the part.
-    part : ndarray, (m,) int
-    weight : ndarray, (m,)
+    Offsets, (m, 3), are from any place, which is best near the center of the part.
     """
     height, square = np.einsum("ij,ij->i", offset, normals), np.einsum("ij,ij->i", offset, offset)
     values = np.column_stack([np.ones(len(part)), offset, normals, height, square, np.abs(normals[:, 2])])
@@ -132,25 +98,11 @@ def _seen_by_sums(sums: Floats) -> tuple[Floats, Floats, Bools, Bools]:
 
 
 def propagate_signs(nearest: Nearest, normals: Floats) -> tuple[Floats, sparse.csr_array]:
-    """Flip normals so that neighbors agree.
+    """Flip unit normals, (m, 3), so that neighbors agree; return them, and the tree along which that is passed on.
 
     The sign travels along a minimum spanning tree of the neighbor graph, whose edges cost least where a circular arc
     joins both points best (Hoppe, DeRose, Duchamp, McDonald, Stuetzle 1992). Along an arc the second normal is the
     mirror image of the first in the plane halfway between the points, which holds across sharp edges too.
-
-    Parameters
-    ----------
-    nearest : Nearest
-        Of m points.
-    normals : ndarray, (m, 3)
-        Unit normals of arbitrary sign.
-
-    Returns
-    -------
-    ndarray, (m, 3)
-        The same normals with consistent signs.
-    csr_array, (m, m)
-        The tree.
     """
     points = nearest.points
     n = len(points)

@@ -15,24 +15,14 @@ _BLOCK = 1 << 13  # points looked at at one time
 
 
 def find_outliers(nearest: Nearest, usual: float | None = None) -> Bools:
-    """Find points that lie off the surfaces of nearly all of their neighbors.
+    """Find points that lie off the surfaces of nearly all of their neighbors, (m,) bool.
 
     Twelve neighbors are the witnesses of a point. Each of them describes the surface by a quadric through its own
     neighbors, without those that turn out to lie off it. The point is on the surface where three of these pass nearer
     than a share of its spacing and the scatter of the witness' own neighbors. (The spacing of a point far off is half
     its distance from the surface, so that the rule holds at any height.) Outliers are no witnesses; nor are, for sparse
-    points, those whose neighbors fill a volume.
-
-    Parameters
-    ----------
-    nearest : Nearest
-        Of m points.
-    usual : float, optional
-        Spacing around most points; the median of these if not given.
-
-    Returns
-    -------
-    ndarray, (m,) bool
+    points, those whose neighbors fill a volume. `usual` is the spacing around most points; the median of these if not
+    given.
     """
     usual = float(np.median(nearest.spacing)) if usual is None else usual
     surface, result = nearest.quadrics, np.zeros(len(nearest.points), dtype=bool)
@@ -123,12 +113,7 @@ def heights_over_witnesses(nearest: Nearest, surface: Quadrics, rows: Ints) -> F
 def _let_go(nearest: Nearest, surface: Quadrics, rows: Ints) -> tuple[Quadrics, Floats]:
     """Fit the quadrics of some points, (k,) int, again without the neighbors off them, and measure how these scatter.
 
-    Returns
-    -------
-    Quadrics
-        Of the k points.
-    scatter : ndarray, (k,)
-        Standard deviation of normal values with the same median.
+    The scatter, (k,), is the standard deviation of normal values with the same median.
     """
     points, spacing = nearest.points, nearest.spacing
     weight = np.empty((len(rows), nearest.index.shape[1]))

@@ -60,15 +60,8 @@ class Pairs:
     def over_ends(self, values: Callable[[Patch], Ends], count: int, report: Report = lambda: None) -> Floats:
         """Return the sums over the pairs of each point of their quantities at that end, (count, m).
 
-        Parameters
-        ----------
-        values : callable
-            Returns of a patch the quantities, (pairs,) each, that its pairs have at their first points, and as many
-            that they have at their second points.
-        count : int
-            How many quantities.
-        report : callable
-            Called after each patch; may raise `Cancelled`.
+        `values` returns of a patch the quantities, (pairs,) each, that its pairs have at their first points, and as
+        many that they have at their second points. `report` is called after each patch; it may raise `Cancelled`.
         """
 
         def sums(patch: Patch) -> tuple[Floats, Floats]:
@@ -98,24 +91,11 @@ class Pairs:
 def find_pairs(
     tree: cKDTree, lengths: Floats, report: Report = lambda: None, nearest: Nearest | None = None
 ) -> list[Array]:
-    """Find all pairs nearer than 3 h_ij, with h_ij = (h_i + h_j) / 2.
+    """Find all pairs nearer than 3 h_ij, with h_ij = (h_i + h_j) / 2, for smoothing lengths h, (n,).
 
-    Parameters
-    ----------
-    tree : cKDTree
-        Of n distinct points.
-    lengths : ndarray, (n,)
-        Smoothing lengths.
-    report : callable
-        Called before each block of points; may raise `Cancelled`.
-    nearest : Nearest, optional
-        Of the points: where these reach further than the kernel, no others are searched for.
-
-    Returns
-    -------
-    first, second : ndarray, (pairs,) int32
-        Each pair once, ordered by the first.
-    distance : ndarray, (pairs,)
+    Return their first and second points, (pairs,) int32, each pair once and ordered by the first, and their distances.
+    Points are distinct. Where their nearest ones reach further than the kernel, no others are searched for. `report` is
+    called before each block of points; it may raise `Cancelled`.
     """
     radii = SUPPORT * lengths
     many, found = np.zeros(tree.n, dtype=np.int64), []

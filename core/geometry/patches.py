@@ -67,19 +67,7 @@ def _taken(values: Array, places: Ints) -> Array:
 
 
 def divide_pairs(start: Ints, second: Ints) -> list[Patch]:
-    """Divide pairs into patches.
-
-    Parameters
-    ----------
-    start : ndarray, (m + 1,) int
-        Where the pairs of each first point start.
-    second : ndarray, (pairs,) int32
-        The second point of each pair.
-
-    Returns
-    -------
-    list of Patch
-    """
+    """Divide pairs into patches, by where those of each first point start, (m + 1,), and their second points."""
     cuts = np.unique(np.searchsorted(start, np.append(np.arange(0, start[-1], _PAIRS), start[-1])))
     return [_patch(start[low : high + 1], second, low) for low, high in pairwise(cuts)]
 

@@ -72,17 +72,8 @@ def check_points(points: ArrayLike) -> Floats:
 def scale_points(points: Floats, decisions: Decisions | None = None) -> ScaledPoints:
     """Center, scale and merge duplicates, so that all that follows is free of units.
 
-    Parameters
-    ----------
-    points : ndarray, (n, 3)
-        From `check_points`.
-    decisions : Decisions, optional
-        Of the center and the scale.
-
-    Raises
-    ------
-    TooFewPointsError, NotASurfaceError
-        Fewer distinct points than a surface needs, or all of them on one line.
+    Points, (n, 3), are from `check_points`; decisions are of the center and the scale. Fewer distinct points than a
+    surface needs raise `TooFewPointsError`, points on one line `NotASurfaceError`.
     """
     decisions = decisions or Decisions()
     # Means over sorted numbers, so that rounding, and all that hangs on it, is the same in any order of the points.
@@ -113,13 +104,8 @@ def scale_points(points: Floats, decisions: Decisions | None = None) -> ScaledPo
 def _merge(points: Floats) -> tuple[Floats, Ints, Ints]:
     """Take points at one place, in scaled coordinates, as one.
 
-    Returns
-    -------
-    distinct : ndarray, (m, 3)
-    first : ndarray, (m,) int
-        The first point at each of their places.
-    inverse : ndarray, (n,) int
-        The place of each point.
+    Return the m distinct ones, the first point at each of their places, (m,) int, and the place of each point, (n,)
+    int.
     """
     order = np.lexsort(points.T[::-1])
     ordered = points[order]
@@ -145,10 +131,7 @@ def _merge(points: Floats) -> tuple[Floats, Ints, Ints]:
 def as_mask(chosen: ArrayLike, count: int) -> Bools:
     """Return a set of points, an index, (k,) indices or an (n,) bool mask, as a mask.
 
-    Raises
-    ------
-    InvalidPointsError
-        Neither whole numbers below n nor n truth values.
+    Neither whole numbers below n nor truth values raise `InvalidPointsError`.
     """
     given = as_array(chosen, "Sets of points")
     if given.dtype == bool and given.shape == (count,):
@@ -168,10 +151,7 @@ def as_mask(chosen: ArrayLike, count: int) -> Bools:
 def as_indices(chosen: ArrayLike, count: int, name: str) -> Ints:
     """Return a set of points, an index, (k,) indices or an (n,) bool mask, as indices in the order given.
 
-    Raises
-    ------
-    InvalidPointsError
-        Neither whole numbers below n nor n truth values, or some points named several times.
+    Other numbers, or some points named several times, raise `InvalidPointsError`.
     """
     mask = as_mask(chosen, count)
     given = np.atleast_1d(chosen)
@@ -189,10 +169,7 @@ def as_indices(chosen: ArrayLike, count: int, name: str) -> Ints:
 def check_boundary(chosen: ArrayLike, count: int, first: Ints) -> Bools:
     """Check a set of points at the boundary, (k,) indices or a (count,) mask, and return the mask of some, (m,).
 
-    Raises
-    ------
-    InvalidPointsError
-        No set of points, or too few different ones.
+    What is no set of points, or has too few different ones, raises `InvalidPointsError`.
     """
     mask = as_mask(chosen, count)[first]
     found = np.count_nonzero(mask)
@@ -204,10 +181,7 @@ def check_boundary(chosen: ArrayLike, count: int, first: Ints) -> Bools:
 def check_distances(distances: ArrayLike, count: int) -> Floats:
     """Check distances to a boundary, (count,), infinite where there is none near.
 
-    Raises
-    ------
-    InvalidPointsError
-        Another shape, negative, or NaN.
+    Another shape, negative numbers, or NaN raise `InvalidPointsError`.
     """
     advice = f"Give {count} numbers that are not negative, infinity where there is no boundary near."
     given = check_array(distances, "Distances to the boundary", [(count,)], advice)
@@ -220,10 +194,7 @@ def check_distances(distances: ArrayLike, count: int) -> Floats:
 def check_values(values: ArrayLike, count: int, columns: bool = True) -> Floats:
     """Check functions on the points and return them, (count,) or with columns (count, k), in double precision.
 
-    Raises
-    ------
-    InvalidPointsError
-        Another shape, no real numbers, or not finite.
+    Another shape, other than real numbers, or those that are not finite raise `InvalidPointsError`.
     """
     shapes: list[Shape] = [(count,), (count, None)] if columns else [(count,)]
     row = "row of real numbers" if columns else "real number"

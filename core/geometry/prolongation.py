@@ -202,22 +202,10 @@ def balanced_weights(weight: Floats, offset: Floats, least: float, beyond: float
     """Balance weights, so that they carry linear functions as they are: moving least squares of first order.
 
     The value at zero of the linear function that fits the values at some offsets best is a sum of these values with
-    other weights.
-
-    Parameters
-    ----------
-    weight : ndarray, (n, k)
-        Of the neighbors of each place; they add up to one, and so does what is returned.
-    offset : ndarray, (d, n, k)
-        Where the neighbors are, seen from the place.
-    least : float
-        Share of the neighbors' scatter that counts as one in each direction: those in which less is not balanced.
-    beyond : float
-        Scatters beyond the middle of the neighbors up to which values go on in their slope.
-
-    Returns
-    -------
-    ndarray, (n, k)
+    other weights. Weights, (n, k), of the neighbors of each place add up to one, as do those that are returned;
+    offsets, (d, n, k), are where the neighbors are, seen from the place. `least` is the share of the neighbors' scatter
+    that counts as one in each direction: those in which less is not balanced. `beyond` is up to how many scatters
+    beyond the middle of the neighbors values go on in their slope.
     """
     dimensions = len(offset)
     mean = np.einsum("nk,dnk->dn", weight, offset)

@@ -175,10 +175,7 @@ def count_curves(roundness: Floats) -> int:
 def check_surface(curves: int, count: int) -> None:
     """Check that so many points are those of a surface, by `count_curves`.
 
-    Raises
-    ------
-    NotASurfaceError
-        The points of many neighborhoods lie along a curve.
+    If the points of many neighborhoods lie along a curve, `NotASurfaceError` is raised.
     """
     if curves > MANY * count:
         raise NotASurfaceError(
@@ -188,19 +185,9 @@ def check_surface(curves: int, count: int) -> None:
 
 
 def heights_over(quadrics: Quadrics, points: Floats, rows: Ints, other: Ints) -> Floats:
-    """Return how far other points are from the quadrics of some, with a sign, along their normals.
+    """Return how far other points are from the quadrics of some, with a sign, along their normals, (k, views).
 
-    Parameters
-    ----------
-    quadrics : Quadrics
-        Of m points.
-    points : ndarray, (m, 3)
-    rows, other : ndarray of int
-        The points with the quadrics, and those above them, of shapes that broadcast to (k, views).
-
-    Returns
-    -------
-    ndarray, (k, views)
+    Rows and others, the points with the quadrics and those above them, have shapes that broadcast to that.
     """
     x, y, z = (
         points[other, axis] - (points[rows, axis] + quadrics.height[rows, axis])  # not of all points, for some rows

@@ -59,33 +59,19 @@ def smooth_rounded(
 ) -> Smoothed:
     """Smooth points that are rounded in steps about as large as their spacing; others stay as they are.
 
-    Parameters
-    ----------
-    nearest : Nearest
-        Of m points.
-    settle : callable
-        Takes `find_rounding` without arguments, and returns what it finds, or what is agreed on.
+    `settle` takes `find_rounding` without arguments, and returns what it finds, or what is agreed on.
     """
     rounding = settle(lambda: find_rounding(nearest.tree))
     return smooth_along(nearest, rounding) if rounding.any() else Smoothed(nearest, np.zeros(len(nearest.points)), 0.0)
 
 
 def find_rounding(tree: cKDTree) -> Floats:
-    """Find along which direction points are rounded in steps about as large as the spacing, with noise.
+    """Find along which direction points are rounded in steps about as large as the spacing, with noise, (3,).
 
     Neighbors then lie on a few parallel planes, exactly, the same ones all over the cloud, and in no order: pixels
     beside each other are on different ones. As each pixel is seen once, no two points lie on top of each other along
-    the direction, unlike those of several sheets.
-
-    Parameters
-    ----------
-    tree : cKDTree
-        Of m distinct points, some of which are looked at.
-
-    Returns
-    -------
-    ndarray, (3,)
-        Along that direction, as long as usual steps, as a share of the spacing; zero where points are not rounded so.
+    the direction, unlike those of several sheets. Some of the distinct points of a tree are looked at. The vector is as
+    long as usual steps, as a share of the spacing; zero where points are not rounded so.
     """
     none, points = np.zeros(3), tree.data
     if len(points) <= FEW:
@@ -141,15 +127,9 @@ def _steps(height: Floats) -> Floats:
 def smooth_along(nearest: Nearest, rounding: Floats) -> Smoothed:
     """Move points along the direction in which they are rounded onto quadrics through their neighbors.
 
-    Neighbors are the nearest ones across the direction, as levels tell nothing of what is next to what. Points that
-    are farther off than steps and noise explain, and those where the surface is steep, stay as they are.
-
-    Parameters
-    ----------
-    nearest : Nearest
-        Of m points.
-    rounding : ndarray, (3,)
-        From `find_rounding`.
+    The direction, (3,), is from `find_rounding`. Neighbors are the nearest ones across the direction, as levels tell
+    nothing of what is next to what. Points that are farther off than steps and noise explain, and those where the
+    surface is steep, stay as they are.
     """
     points, spacing, usual = nearest.points, nearest.spacing, float(np.linalg.norm(rounding))
     axis = rounding / usual

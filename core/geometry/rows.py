@@ -18,17 +18,7 @@ def look_across_rows(nearest: Nearest) -> Nearest:
     """Find the neighbors of points anew whose nearest ones lie along a row, as long as there are other rows.
 
     They are then the nearest ones in each of eight directions, in turn. Of a curve, which has no rows beside it, the
-    points keep the neighbors that they have.
-
-    Parameters
-    ----------
-    nearest : Nearest
-        Of m points.
-
-    Returns
-    -------
-    Nearest
-        The same one where points nowhere lie along rows.
+    points keep the neighbors that they have. Where points nowhere lie along rows the same neighbors are returned.
     """
     if nearest.index.shape[1] <= NEXT:
         return nearest

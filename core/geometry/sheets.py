@@ -55,27 +55,10 @@ def same_sheet(
 def on_sheet(
     nearest: Nearest, normals: Floats, rows: Ints, other: Ints, distance: Floats, close: float = 2.0
 ) -> tuple[Bools, Floats]:
-    """Tell which of other points lie on the sheet of some points.
+    """Tell which of other points, (k, views) int, lie on the sheet of some points, (k,) int.
 
-    Parameters
-    ----------
-    nearest : Nearest
-        Of m points.
-    normals : ndarray, (m, 3)
-        Unit normals.
-    rows : ndarray, (k,) int
-        The points.
-    other : ndarray, (k, views) int
-        Points that each of them is compared with.
-    distance : ndarray, (k, views)
-    close : float
-        See `same_sheet`.
-
-    Returns
-    -------
-    same : ndarray, (k, views) bool
-    cosine : ndarray, (k, views)
-        Of the angle between the normals.
+    Return also the cosines of the angles between their unit normals, (m, 3). Distances are (k, views); for `close` see
+    `same_sheet`.
     """
     cosine, left, right = heights_of_ends(chords(nearest.points, rows, other), normals, rows, other)
     return same_sheet(left, right, cosine, distance, nearest.spacing[rows, None], close), cosine
@@ -112,16 +95,9 @@ def fit_sheets(nearest: Nearest, before: Sheets | None = None, changed: Bools | 
 
     Where the quadric of all neighbors misses them, a plane is looked for among those through the point and two of its
     nearest neighbors that has most neighbors near it, and moved to fit these best. With these normals neighbors on
-    other sheets are separated from those on the point's own, and left out of its quadric.
-
-    Parameters
-    ----------
-    nearest : Nearest
-        Of m points.
-    before : Sheets, optional
-        Of the same points before some of them moved, which is kept where nothing has changed.
-    changed : ndarray, (m,) bool, optional
-        Points that have moved, or have neighbors that did or that are others than before.
+    other sheets are separated from those on the point's own, and left out of its quadric. The sheets `before` some
+    points moved are kept but at points in `changed`, (m,) bool, which moved, or have neighbors that did or that are
+    others than before.
     """
     points, index, whole = nearest.points, nearest.index, nearest.weight
     if before is None or changed is None:
@@ -181,21 +157,10 @@ def _own_plane(offset: Floats, weight: Floats, spacing: Floats) -> Array:
 
 
 def label_sheets(nearest: Nearest, normals: Floats, component: Ints) -> Ints:
-    """Divide components into sheets that are close to each other but nowhere meet.
+    """Divide components, (m,) int, into sheets that are close to each other but nowhere meet; return their numbers.
 
-    Parameters
-    ----------
-    nearest : Nearest
-        Of m points.
-    normals : ndarray, (m, 3)
-        Unit normals of any sign.
-    component : ndarray, (m,) int
-        Components that gaps divide, none negative.
-
-    Returns
-    -------
-    ndarray, (m,) int
-        The largest component is 0; points off the surface are -1.
+    None of the components, which gaps divide, is negative. The largest is 0; points off the surface are -1. Unit
+    normals, (m, 3), may have any sign.
     """
     sheet = number_by_size(label_connected(nearest.index, sheet_neighbors(nearest, normals, False)), COUNT)
     return number_sheets(join_touching(nearest, sheet), component)
@@ -324,23 +289,11 @@ def _plainly_on_one_sheet(pairs: Pairs, oriented: Floats, spacing: Floats) -> Bo
 def step_lengths(
     nearest: Nearest, oriented: Floats, settle: Callable[[Callable[[], Ints]], Ints] = lambda find: find()
 ) -> sparse.csr_array:
-    """Return the lengths of the steps along sheets between adjacent points.
+    """Return the lengths of the steps along sheets between adjacent points, symmetric, (m, m).
 
-    Sharp folds, whose normals join them to nothing, are joined to what is nearest to them.
-
-    Parameters
-    ----------
-    nearest : Nearest
-        Of m points.
-    oriented : ndarray, (m, 3)
-        Unit normals whose signs agree.
-    settle : callable
-        Takes `find_bridges` without arguments, and returns what it finds, or others that are agreed on.
-
-    Returns
-    -------
-    csr_array, (m, m)
-        Symmetric; no more parts than the neighborhoods themselves hang together in.
+    Sharp folds, whose normals join them to nothing, are joined to what is nearest to them: there are no more parts than
+    the neighborhoods themselves hang together in. Signs of the unit normals, (m, 3), agree. `settle` takes
+    `find_bridges` without arguments, and returns what it finds, or others that are agreed on.
     """
     next_to = sheet_neighbors(nearest, oriented, True)
     count = len(next_to)
@@ -380,15 +333,7 @@ def choose_bridges(left: Ints, right: Ints, gap: Floats) -> Ints:
 def ways_along(steps: sparse.csr_array, tree: cKDTree, first: Ints, second: Ints, longest: Floats) -> Floats:
     """Return the length of the shortest path along steps between the ends of pairs, (k,); infinite if it is longer.
 
-    Parameters
-    ----------
-    steps : csr_array, (m, m)
-        Their lengths, symmetric.
-    tree : cKDTree
-        Of the m points.
-    first, second : ndarray, (k,) int
-    longest : ndarray, (k,)
-        Greatest length of the path.
+    `steps`, (m, m), are their lengths, symmetric; `longest`, (k,), is the greatest length of the path.
     """
     # Search from the end that has more pairs: one search serves all pairs of its start.
     often = np.bincount(first, minlength=tree.n) + np.bincount(second, minlength=tree.n)

@@ -26,27 +26,17 @@ _REACH, _WIDE = 7, 2.0  # and few points to many, within two distances of the se
 
 
 def stray_scores(nearest: Nearest, report: Report = lambda: None) -> Floats:
-    """Measure how far points are off the surface that their neighbors describe.
+    """Measure how far points are off the surface that their neighbors describe, (m,): above 1 for stray points.
 
     As in `find_outliers` twelve neighbors are the witnesses of a point, and three must agree. Here points far from
     their neighbors, by the spacing of these, take part in no witness' quadric until they are known to be on the
     surface, so that many stray points do not vouch for each other. What scatters about the surface as densely as the
     points around is no stray, and what lies alone needs less height to be one.
 
-    Parameters
-    ----------
-    nearest : Nearest
-        Of m points.
-    report : callable
-        Called before each round; may raise `Cancelled`.
-
-    Returns
-    -------
-    ndarray, (m,)
-        Above 1 for stray points: the height, that is the third least over the quadrics of the witnesses, over what
-        counts as on the surface, 4 at most, or its cube where above 1, times the fourth power of the distance of the
-        third neighbor on the surface, over two spacings of the points there. Infinite where no three witnesses show a
-        surface.
+    The score is the height, that is the third least over the quadrics of the witnesses, over what counts as on the
+    surface, 4 at most, or its cube where above 1, times the fourth power of the distance of the third neighbor on the
+    surface, over two spacings of the points there. It is infinite where no three witnesses show a surface. `report` is
+    called before each round; it may raise `Cancelled`.
     """
     spacing, surface = nearest.spacing, nearest.quadrics
     around = np.quantile(spacing[nearest.index[:, _AROUND]], 0.25, axis=1)
@@ -139,19 +129,10 @@ def without(nearest: Nearest, off: Bools) -> Nearest:
 
 
 def label_parts(nearest: Nearest) -> Ints:
-    """Number the parts of a cloud without points off its surface, which gaps separate.
+    """Number the parts of a cloud without points off its surface, which gaps separate, (m,) int.
 
-    Points are joined to neighbors nearer than 2.5 times the distances of the third neighbors of both, so that clumps
-    of few points do not reach each other; then parts of few points to those of many, within the reach of these.
-
-    Parameters
-    ----------
-    nearest : Nearest
-        Of m points.
-
-    Returns
-    -------
-    ndarray, (m,) int
+    Points are joined to neighbors nearer than 2.5 times the distances of the third neighbors of both, so that clumps of
+    few points do not reach each other; then parts of few points to those of many, within the reach of these.
     """
     index, distance = nearest.index[:, 1:], nearest.distance[:, 1:]
     last = distance.shape[1] - 1

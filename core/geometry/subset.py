@@ -181,14 +181,8 @@ def _discs(tree: cKDTree, rank: Ints, radius: float) -> Bools:
 def independent(first: Ints, second: Ints, rank: Array, report: Callable[[], None] = lambda: None) -> Bools:
     """Return which points stay, (m,) bool: no two of a pair, and of each left out one that comes before it.
 
-    Parameters
-    ----------
-    first, second : ndarray, (p,) int
-        Pairs of which one may stay (Luby 1986).
-    rank : ndarray, (m,)
-        The one of the lower rank comes before the other. No two are the same.
-    report : callable
-        Called at each round; may raise `Cancelled`.
+    Of each of p pairs one may stay (Luby 1986). The one of the lower rank, (m,), comes before the other; no two ranks
+    are the same. `report` is called at each round; it may raise `Cancelled`.
     """
     count, swap = len(rank), rank[first] > rank[second]
     first, second = np.where(swap, second, first), np.where(swap, first, second)

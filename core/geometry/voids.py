@@ -70,24 +70,9 @@ def find_voids(nearest: Nearest, normals: Floats, cells: Cells, gaps: Floats, sc
     """Find voids by the empty discs around the furthest corners of Voronoi cells.
 
     Random points leave single discs twice as wide as usual, uneven ones larger and more of them, but no row of them
-    that is much longer than wide, with points as dense as elsewhere all along it.
-
-    Parameters
-    ----------
-    nearest : Nearest
-        Of m points.
-    normals : ndarray, (m, 3)
-        Those that the cells were measured with.
-    cells : Cells
-        Of the points, within the boundary that is known.
-    gaps : ndarray, (m,)
-        The usual radius of empty discs, from `mean_gaps`.
-    scatter : ndarray, (m,)
-        What quadrics through the own sheet miss the neighbors by, in spacings.
-
-    Returns
-    -------
-    Voids
+    that is much longer than wide, with points as dense as elsewhere all along it. Cells are within the boundary that is
+    known, and measured with these normals, (m, 3). `gaps`, (m,), are the usual radii of empty discs, from `mean_gaps`;
+    `scatter`, (m,), is what quadrics through the own sheet miss the neighbors by, in spacings.
     """
     found = (cells.radius > VOID * gaps) & (cells.radius < PROBE * gaps)
     rows = np.flatnonzero(found & (scatter < ON))

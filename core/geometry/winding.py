@@ -23,26 +23,11 @@ _SAMPLE = 2000  # points whose spacing gives the median one
 
 
 def orient_by_winding(nearest: Nearest, normals: Floats, place: Floats, part: Ints) -> Floats:
-    """Flip normals so that neighbors agree, and every patch of the surface with all others, outwards.
+    """Flip unit normals, (m, 3), so that neighbors agree, and every patch of the surface with all others, outwards.
 
     Where sheets come close, neighbors tell little: a leg of a figure may get its sign from the other leg that it
-    touches. The winding number, of all points, decides.
-
-    Parameters
-    ----------
-    nearest : Nearest
-        Of m points.
-    normals : ndarray, (m, 3)
-        Unit normals of arbitrary sign.
-    place : ndarray, (m, 3)
-        Where the points are, components not moved apart.
-    part : ndarray, (m,) int
-        Component of each point.
-
-    Returns
-    -------
-    ndarray, (m, 3)
-        The same normals with consistent signs, each component as `outer_signs` has it.
+    touches. The winding number, of all points, decides; the sides of each component, (m,), are as `outer_signs` has
+    them. `place`, (m, 3), is where the points are, components not moved apart.
     """
     normals, _ = orient_patches(nearest, normals, place)
     return normals * outer_signs(place, normals, part)[part, None]
@@ -104,13 +89,8 @@ def _certainty(points: Floats, normals: Floats, first: Ints, second: Ints) -> Fl
 def winding_signs(points: Floats, normals: Floats, weight: Floats, patch: Ints, part: Ints) -> Floats:
     """Return the sign of each patch by which the winding number changes least off the surface, outside 0.
 
-    Parameters
-    ----------
-    points, normals : ndarray, (m, 3)
-    weight : ndarray, (m,)
-        Areas, up to a factor.
-    patch, part : ndarray, (m,) int
-        Numbers of patches, and of the connected parts of the surface that they divide.
+    Weights, (m,), are areas up to a factor; patches and parts are numbers, (m,), the latter of the connected parts of
+    the surface that patches divide.
     """
     count = part.max() + 1
     energy = _patch_energies(points, normals, weight, patch)
@@ -140,12 +120,8 @@ def _clumps(
 ) -> tuple[tuple[Array, Array, Array, Ints, float], Ints]:
     """Gather dipoles of one patch and place, until there are at most so many.
 
-    Returns
-    -------
-    tuple
-        Place, moment, weight and patch of each clump, and the size of a place.
-    ndarray, (m,) int
-        The clump of each given dipole.
+    Return place, moment, weight and patch of each clump, and the size of a place; and the clump of each dipole, (m,)
+    int.
     """
     size = 0.0 if len(points) <= most else np.sqrt(len(points) / most) * _median_spacing(points)
     while True:

@@ -134,13 +134,8 @@ def _joined(vertices: Floats, values: Floats, level: float, segments: Ints) -> l
 def _ordered(ends: Ints, count: int) -> tuple[Ints, Ints, Bools]:
     """Order cuts along the lines that segments, (s, 2) pairs of cuts, form.
 
-    Returns
-    -------
-    order : ndarray, (count,) int
-        The cuts, line by line.
-    starts : ndarray, (l,) int
-        Where in it each line begins.
-    closed : ndarray, (l,) bool
+    Return the cuts, line by line, (count,) int; where in them each line begins, (l,) int; and which are closed, (l,)
+    bool.
     """
     used = np.unique(ends)
     segments = sparse.csr_array((np.ones(len(ends), bool), (ends[:, 0], ends[:, 1])), shape=(count, count))

@@ -146,14 +146,8 @@ class SurfaceMeasures:
     def smoothed(self, members: Bools, near: Ints) -> tuple[Ints, Floats, Floats]:
         """Smooth the step between members and others by heat flow, near the line between them.
 
-        Returns
-        -------
-        rows : ndarray, (r,) int
-            Points so close to the line that they tell where it is.
-        level : ndarray, (r,)
-            About their distance from the line, positive at members [L].
-        rise : ndarray, (r, 3)
-            Unit tangents towards members.
+        Return the points so close to the line that they tell where it is, (r,) int; about their distance from it,
+        positive at members [L]; and unit tangents towards members, (r, 3).
         """
         pairs, areas = self.laplacian.stiffness[near], self.laplacian.areas[near]
         time = 0.5 * (_SPREAD * float(np.median(self.spacing[near]))) ** 2 if len(near) else 0.0
@@ -391,13 +385,8 @@ class _Line(NamedTuple):
     def distances(self, laplacian: LaplaceBeltrami, rows: Ints) -> tuple[Ints, Floats, Floats]:
         """Measure points near the line, those of some rows that are on its sheet.
 
-        Returns
-        -------
-        rows : ndarray, (r,) int
-        signed : ndarray, (r,)
-            Their distances from the line, positive on the side of members.
-        spacing : ndarray, (r,)
-            At the line.
+        Return their rows, (r,) int, their distances from the line, positive on the side of members, and the spacing
+        there.
         """
         places = np.concatenate([laplacian.surface_points[rows], self.feet])
         apart = move_apart(places, np.concatenate([laplacian.component[rows], self.component]))
@@ -428,13 +417,9 @@ class _Line(NamedTuple):
 
 
 def _find_line(whole: SurfaceMeasures, members: Bools, report: Callable[[float], None]) -> tuple[Ints, _Line]:
-    """Find the line between members and others; it has no pieces where there are none of both on a component.
+    """Find all points near the line between members and others, (r,) int, and the line.
 
-    Returns
-    -------
-    near : ndarray, (r,) int
-        All points near it.
-    line : _Line
+    It has no pieces where there are none of both on a component.
     """
     near = whole.around(members)
     rows, level, rise = whole.smoothed(members, near)

@@ -153,11 +153,7 @@ def _onto(
 ) -> tuple[list[IsoLine], float]:
     """Move the corners of lines within the plane onto the surface.
 
-    Returns
-    -------
-    list of IsoLine
-    float
-        Share of the corners where the plane only touches the surface.
+    Return them, and the share of the corners where the plane only touches the surface.
     """
     if not lines:
         return [], 0.0

@@ -229,10 +229,7 @@ class _Caps:
     def domes(self, side: Floats) -> tuple[Array, Array]:
         """Return the volume beyond each fan, (k,), and by how much that may be wrong, (k,).
 
-        Parameters
-        ----------
-        side : ndarray, (c,)
-            1 for components whose faces point outwards, -1 for others.
+        Sides, (c,), are 1 for components whose faces point outwards, -1 for others.
         """
         vector = 0.5 * self._sums(self._crosses) * side[self.component, None]
         area = 0.5 * self._sums(np.linalg.norm(self._crosses, axis=1))
@@ -309,15 +306,8 @@ def _winding(triangles: Floats) -> float:
 def _notices(faces: Array, opening: Ints, inside: Bools, mixed: float) -> list[str]:
     """Return texts on what was closed, subtracted or not counted.
 
-    Parameters
-    ----------
-    faces : ndarray, (c,) int
-        Of each component.
-    opening : ndarray, (k,) int
-        The component of each opening.
-    inside : ndarray, (c,) bool
-    mixed : float
-        Share of the area whose normals point to the other side.
+    `faces`, (c,), are how many each component has, `opening`, (k,), the component of each opening, and `mixed` the
+    share of the area whose normals point to the other side.
     """
     result = []
     if len(opening):

@@ -236,10 +236,7 @@ class Propagator:
 def read_pair(state: Any, count: int) -> tuple[Floats, bool]:
     """Return two functions, (2, n), given as a pair or as an array with two columns, and whether it was the latter.
 
-    Raises
-    ------
-    InvalidPointsError
-        Other than two, or values that do not fit the points, or are not finite.
+    Other than two, or values that do not fit the points, or are not finite, raise `InvalidPointsError`.
     """
     columns = isinstance(state, np.ndarray) and state.ndim == 2 and state.shape[1] == 2 and len(state) == count
     try:

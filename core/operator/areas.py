@@ -73,21 +73,10 @@ def estimate_areas(
 
 
 def solve_areas(cloud: Cloud, distance: Floats, report: Report = lambda: None) -> Floats:
-    """Solve for the areas of the distinct points, in scaled coordinates.
+    """Solve for the areas of the distinct points, (m,), in scaled coordinates, all positive.
 
-    Parameters
-    ----------
-    cloud : Cloud
-        Of m distinct points, with p pairs.
-    distance : ndarray, (p,)
-        Distance of each pair along the surface.
-    report : callable
-        Called before each product with the kernel matrix; may raise `Cancelled`.
-
-    Returns
-    -------
-    ndarray, (m,)
-        Areas, all positive.
+    Distances, (p,), are those of pairs along the surface. `report` is called before each product with the kernel
+    matrix; it may raise `Cancelled`.
     """
     lengths = cloud.pairs.lengths
     matrix = KernelMatrix(cloud.pairs, distance, cloud.boundary, report)
@@ -161,29 +150,15 @@ class KernelMatrix:
 
 
 def fast_areas(matrix: KernelMatrix, target: Floats, cells: Floats) -> Floats:
-    """Solve A v = b by two projected rounds of polynomials in A, from the areas c of the Voronoi cells.
+    """Solve A v = b by two projected rounds of polynomials in A, from the areas c of the Voronoi cells, for v > 0.
 
     M = V0^(1/2) A V0^(1/2) with v0 = c / (A c) has its eigenvalues in [-1, 1]; but for pairs left out between close
-    sheets, images in boundaries and noise they would be positive. Each round adds p(M) times the residual to y in
-    M y = V0^(1/2) b, v = V0^(1/2) y, where p(x) is close to 1 / x down to a least eigenvalue, and about zero below it:
-    the smooth part is solved for, and details that the kernel does not resolve stay near the cells. In between, areas
-    below the floor of c / 2 are set to it, held there, and released when the gradient points inward. A fixed number of
-    linear steps, unlike conjugate gradients, does not amplify rounding: the result is the same to 1e-10 for any order
-    of the points.
-
-    Parameters
-    ----------
-    matrix : KernelMatrix
-        A, (n, n).
-    target : ndarray, (n,)
-        b, the integral that the kernel should have at each point (1 on a flat surface).
-    cells : ndarray, (n,)
-        Areas of the Voronoi cells.
-
-    Returns
-    -------
-    ndarray, (n,)
-        v, all positive.
+    sheets, images in boundaries and noise they would be positive. Each round adds p(M) times the residual to y in M y =
+    V0^(1/2) b, v = V0^(1/2) y, where p(x) is close to 1 / x down to a least eigenvalue, and about zero below it: the
+    smooth part is solved for, and details that the kernel does not resolve stay near the cells. In between, areas below
+    the floor of c / 2 are set to it, held there, and released when the gradient points inward. A fixed number of linear
+    steps, unlike conjugate gradients, does not amplify rounding: the result is the same to 1e-10 for any order of the
+    points. b, (n,), is the integral that the kernel should have at each point (1 on a flat surface).
     """
     root = np.sqrt(cells / (matrix @ cells))
     right, y = root * target, cells / root

@@ -132,14 +132,7 @@ def _matrices(laplacian: LaplaceBeltrami) -> tuple[sparse.csr_array, sparse.csr_
     """Return two means over the neighbors: by the operator's weights, and of all of them and the point alike.
 
     The first takes values of neighbors whose normal points to the other side with the other sign, and those beyond an
-    edge at right angles not at all.
-
-    Returns
-    -------
-    csr_array, (n, n)
-    csr_array, (n, n)
-    ndarray, (n,)
-        Sums of the squared weights of each point.
+    edge at right angles not at all. Return also the sums of the squared weights of each point, (n,).
     """
     stiffness = laplacian.stiffness
     count = np.diff(stiffness.indptr)

@@ -10,18 +10,11 @@ _BLOCK = 1 << 15  # pairs worked on at one time, so that they stay in the cache
 
 
 def tangent_frames(normals: Floats) -> Array:
-    """Give each tangent plane a frame, so that a complex number is a tangent vector.
+    """Give each tangent plane a frame, (n, 3) complex, so that a complex number is a tangent vector.
 
-    Parameters
-    ----------
-    normals : ndarray, (n, 3)
-        Unit normals.
-
-    Returns
-    -------
-    ndarray, (n, 3) complex
-        First axis plus i times the second one; the two and the normal are orthonormal and right-handed. The vector
-        ``v`` has the number ``v @ frame`` of its point, and the number c is the vector ``(conj(c) * frame).real``.
+    It is the first axis plus i times the second one; the two and the unit normal, (n, 3), are orthonormal and
+    right-handed. The vector ``v`` has the number ``v @ frame`` of its point, and the number c is the vector ``(conj(c)
+    * frame).real``.
     """
     axis = np.zeros_like(normals)
     axis[np.arange(len(normals)), np.abs(normals).argmin(axis=1)] = 1.0  # the one that lies most in the plane

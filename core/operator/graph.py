@@ -43,18 +43,9 @@ class NearGraph:
 def near_graph(laplacian: LaplaceBeltrami, count: int) -> NearGraph:
     """Join every point to its nearest ones among those that the operator couples it with.
 
-    The operator's pairs lie on one sheet of the surface, so the graph does not cross the gap between close sheets; it
-    uses only the nearest of them, so that edges do not cross features narrower than the kernel.
-
-    Parameters
-    ----------
-    laplacian : LaplaceBeltrami
-    count : int
-        Nearest neighbors of each point; all at the distance of the last one are included.
-
-    Returns
-    -------
-    NearGraph
+    They are so many, and all at the distance of the last one. The operator's pairs lie on one sheet of the surface, so
+    the graph does not cross the gap between close sheets; it uses only the nearest of them, so that edges do not cross
+    features narrower than the kernel.
     """
     n = len(laplacian.points)
     known = np.flatnonzero(laplacian.component >= 0)

@@ -125,18 +125,7 @@ class ImplicitSurface:
         self._shape_operator[rows] *= -1.0
 
     def heights(self, places: Floats, report: Report = lambda: None) -> Heights:
-        """Measure places near the surface.
-
-        Parameters
-        ----------
-        places : ndarray, (k, 3)
-        report : callable
-            Called after each block; may raise `Cancelled`.
-
-        Returns
-        -------
-        Heights
-        """
+        """Measure places near the surface, (k, 3); `report` is called after each block, and may raise `Cancelled`."""
         count = len(places)
         height, spacing, distance, beyond = np.empty((4, count))
         normal, outward = np.empty((2, count, 3))

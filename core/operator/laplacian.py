@@ -475,18 +475,8 @@ def assemble_laplacian(
 ) -> LaplaceBeltrami:
     """Assemble the operator from what it consists of.
 
-    Parameters
-    ----------
-    points : ndarray, (n, 3)
-        The caller's [L].
-    cloud : Cloud
-        Of m distinct points, with the distances of pairs along the surface.
-    areas : ndarray, (m,)
-        From `solve_areas`.
-    options : LaplacianOptions
-        The settings they were built with.
-    report : callable
-        Called now and then; may raise `Cancelled`.
+    Points, (n, 3) [L], are the caller's; the cloud is of the m distinct ones, with the distances of pairs along the
+    surface; areas, (m,), are from `solve_areas`. `report` is called now and then; it may raise `Cancelled`.
     """
     stiffness = assemble_stiffness(cloud, cloud.pairs.distance, areas, report)
     return laplacian_of(points, cloud, areas, stiffness, options)
@@ -495,24 +485,7 @@ def assemble_laplacian(
 def laplacian_of(
     points: Floats, cloud: Cloud, areas: Floats, assembled: Stiffness, options: LaplacianOptions
 ) -> LaplaceBeltrami:
-    """Transfer the results for the distinct points in scaled coordinates to the caller's points and units.
-
-    Parameters
-    ----------
-    points : ndarray, (n, 3)
-        The caller's [L].
-    cloud : Cloud
-        Of m distinct points.
-    areas : ndarray, (m,)
-        Area elements in scaled coordinates.
-    assembled : Stiffness
-    options : LaplacianOptions
-        The settings they were built with.
-
-    Returns
-    -------
-    LaplaceBeltrami
-    """
+    """Transfer the results for the distinct points in scaled coordinates to the caller's points and units."""
     scaled, pairs, notices = cloud.scaled, cloud.pairs, cloud.notices
     if 2 * len(pairs.first) > len(scaled.points) ** 2 / 3:
         notices.append(
@@ -563,22 +536,9 @@ def narrow_laplacian(
 ) -> LaplaceBeltrami:
     """Build an operator with few neighbors on the same points, to be factorised, or on some of them.
 
-    Parameters
-    ----------
-    laplacian : LaplaceBeltrami
-        Its normals, boundary and `surface_points` are used.
-    neighbors : int
-        Neighbors inside the kernel's support.
-    rows : ndarray, (k,) int, optional
-        Points to build it on alone; its components do not join those of the given operator.
-    progress : callable, optional
-        Called as ``progress(stage, fraction)``; may raise `Cancelled`.
-
-    Returns
-    -------
-    LaplaceBeltrami
-        Less accurate for functions, but sharp at fixed points, and with small factors. The given one if it is as narrow
-        already, and no rows are given.
+    Neighbors are those inside the kernel's support. It is less accurate for functions, but sharp at fixed points, and
+    with small factors. Normals, boundary and `surface_points` are those of the given one, which is returned if it is as
+    narrow already. Of `rows`, (k,) int, components do not join those of the given operator.
     """
     options = replace(
         laplacian.options,

@@ -175,12 +175,7 @@ def correct_eigenvalues(areas: Floats, widths: Floats, values: Floats, vectors: 
     """Recover k^2 from ``lambda = s(k h) / h^2`` mode by mode, with the h^2 that the mode sees on average.
 
     A mode's own mean, ``sum areas h^2 phi^2``, is the one by which a slowly varying h enters the eigenvalue to first
-    order of h^2.
-
-    Raises
-    ------
-    UnresolvedModesError
-        Some modes lie beyond the resolved range.
+    order of h^2. Modes beyond the resolved range raise `UnresolvedModesError`.
     """
     squared = (areas * widths**2) @ vectors**2
     corrected = values * inverse_ratio(values * squared)

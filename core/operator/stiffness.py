@@ -64,23 +64,10 @@ def assemble_stiffness(
 ) -> Stiffness:
     """Assemble K = -D G D of eq. (10) for the caller's points, with weights of the moments that the kernel has.
 
-    Points at the same place take equal parts of its area and couple as neighbors at distance zero. The image of a
-    point in a boundary has the point's value, so that it adds to the weight of the pair.
-
-    Parameters
-    ----------
-    cloud : Cloud
-        Of m distinct points, with p pairs, that stand for n of the caller's.
-    distance : ndarray, (p,)
-        Distance of each pair along the surface.
-    areas : ndarray, (m,)
-        Area elements in scaled coordinates.
-    report : callable
-        Called now and then while weights are balanced; may raise `Cancelled`.
-
-    Returns
-    -------
-    Stiffness
+    Points at the same place take equal parts of its area and couple as neighbors at distance zero. The image of a point
+    in a boundary has the point's value, so that it adds to the weight of the pair. Distances, (p,), are those of pairs
+    along the surface; areas, (m,), are in scaled coordinates. `report` is called now and then while weights are
+    balanced; it may raise `Cancelled`.
     """
     pairs, scaled = cloud.pairs, cloud.scaled
     weights, own, images, alone = _kernel_weights(cloud, distance, areas)
@@ -100,16 +87,8 @@ def assemble_stiffness(
 def stiffness_matrix(scaled: ScaledPoints, pairs: Pairs, weights: Floats, own: Floats) -> sparse.csr_array:
     """Return the matrix of a function's energy, half the sum of ``weights (f_i - f_j)^2`` over ordered pairs, (n, n).
 
-    Parameters
-    ----------
-    scaled : ScaledPoints
-        The m distinct points that stand for n of the caller's.
-    pairs : Pairs
-        With p pairs.
-    weights : ndarray, (p,)
-        Of the pairs; overwritten.
-    own : ndarray, (m,)
-        Of each point with itself: the coupling of points at the same place, which share its area.
+    Weights, (p,), of pairs of distinct points are overwritten; `own`, (m,), are those of each point with itself: the
+    coupling of points at the same place, which share its area.
     """
     if scaled.shared:
         whole = _symmetric(scaled, pairs.first, pairs.second, weights, own)
@@ -120,16 +99,9 @@ def stiffness_matrix(scaled: ScaledPoints, pairs: Pairs, weights: Floats, own: F
 
 
 def _kernel_weights(cloud: Cloud, distance: Floats, areas: Floats) -> tuple[Floats, Floats, _Images, _Images]:
-    """Return the weights of the kernel for pairs, and for points with themselves.
+    """Return the weights of the kernel for pairs, (p,), and for points with themselves, (m,), with their images.
 
-    Returns
-    -------
-    weights : ndarray, (p,)
-        Those of pairs, with their images.
-    own : ndarray, (m,)
-        Those of points with themselves, with their images.
-    images, alone : _Images
-        Of pairs, and of points alone.
+    Return the images of pairs, and of points alone, too.
     """
     pairs, lengths = cloud.pairs, cloud.pairs.lengths
     factor = weight_factor(lengths, cloud.gaussian_curvature)

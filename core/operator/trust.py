@@ -27,16 +27,7 @@ def measure_trust(cloud: Cloud, residual: Floats) -> Floats:
 def doubt_notices(doubt: Ints, areas: Floats) -> list[str]:
     """Return a notice of how much of the area is in doubt, of the cause of most of that, and of what helps.
 
-    Parameters
-    ----------
-    doubt : ndarray, (m,) int
-        Of `Doubt`.
-    areas : ndarray, (m,)
-
-    Returns
-    -------
-    list of str
-        None where little is in doubt.
+    There is none where little is in doubt.
     """
     shares = np.bincount(doubt, areas, len(Doubt)) / areas.sum()
     doubtful, largest = shares[1:].sum(), Doubt(shares[1:].argmax() + 1)

@@ -53,16 +53,7 @@ def covariance_normals(pairs: Pairs, weighted: bool = True) -> Floats:
 
 
 def tangent_planes(points: Floats) -> Floats:
-    """Project every point onto the plane through its neighbors, as section 6 does for noisy points.
-
-    Parameters
-    ----------
-    points : ndarray, (n, 3)
-
-    Returns
-    -------
-    ndarray, (n, 3)
-    """
+    """Project every point, (n, 3), onto the plane through its neighbors, as section 6 does for noisy points."""
     tree, result = cKDTree(points), np.empty_like(points)
 
     def project(part: slice) -> None:

@@ -119,17 +119,7 @@ def build_laplacian(
 def symmetrized_operator(cloud: Cloud, areas: Floats) -> Stiffness:
     """Assemble ``-D G D`` of eq. (10): a pair is projected on one plane, that of its mean normal.
 
-    Parameters
-    ----------
-    cloud : Cloud
-        Of m distinct points that stand for n of the caller's.
-    areas : ndarray, (m,)
-        Area elements in scaled coordinates.
-
-    Returns
-    -------
-    Stiffness
-        Without images in boundaries and widths for the symbol correction.
+    There are no images in boundaries, and no widths for the symbol correction. Areas, (m,), are in scaled coordinates.
     """
     pairs, count = cloud.pairs, len(cloud.scaled.inverse)
     h = pairs.mean(pairs.lengths)

@@ -185,10 +185,7 @@ def nearest_bones(points: ArrayLike, heads: ArrayLike, tails: ArrayLike) -> Floa
 def check_bones(heads: ArrayLike, tails: ArrayLike) -> tuple[Floats, Floats]:
     """Return the ends of bones, (b, 3) each.
 
-    Raises
-    ------
-    InvalidPointsError
-        Another shape, different numbers, none, or not finite.
+    Another shape, different numbers of both, none, or those that are not finite raise `InvalidPointsError`.
     """
     advice = "Give x, y, z of one head and one tail for each bone."
     first = as_doubles(check_array(heads, "Heads", [(None, 3)], advice))

@@ -67,13 +67,7 @@ class Inside:
         return map_coordinates(self._winding, index, order=1, mode="constant", output=np.float32)
 
     def sees(self, starts: Floats, ends: Floats) -> Bools:
-        """Return which straight ways do not leave the body, (k,) bool.
-
-        Parameters
-        ----------
-        starts, ends : ndarray, (k, 3)
-            Ways from places within the body, or on it [L].
-        """
+        """Return which straight ways do not leave the body, (k,) bool, between places in or on it, (k, 3) each [L]."""
         result = np.empty(len(starts), dtype=bool)
         length = np.linalg.norm(ends - starts, axis=1)
         order = np.argsort(length, kind="stable")

@@ -269,13 +269,7 @@ def _check_matrices(matrices: ArrayLike) -> Floats:
 
 
 def _check_table(weights: Any, shape: tuple[int | None, int | None]) -> sparse.csr_array:
-    """Return weights as a sparse array of this shape.
-
-    Raises
-    ------
-    InvalidPointsError
-        Another shape, or not finite.
-    """
+    """Return weights as a sparse array of this shape; another, or numbers not finite, raise `InvalidPointsError`."""
     advice = "Give one row for each point, with a weight for each bone."
     if not sparse.issparse(weights):
         weights = sparse.csr_array(as_doubles(check_array(weights, "Weights", [shape], advice, "biuf")))

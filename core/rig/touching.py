@@ -60,25 +60,12 @@ def _spread(stiffness: sparse.csr_array, points: Floats, normals: Floats, sides:
 
 
 def apart(stiffness: sparse.csr_array, normals: Floats, trust: Floats | None = None) -> tuple[sparse.csr_array, Bools]:
-    """Leave out pairs of points whose normals differ by more than a right angle.
+    """Leave out pairs of points whose normals, (m, 3), differ by more than a right angle; rows sum to zero again.
 
-    Where sheets lie closer than the points of each, single normals are wrong, and would join both sheets.
-
-    Parameters
-    ----------
-    stiffness : csr_array, (m, m)
-        Without positive numbers off its diagonal.
-    normals : ndarray, (m, 3)
-    trust : ndarray, (m,), optional
-        How reliable they are, as of `LaplaceBeltrami`.
-
-    Returns
-    -------
-    stiffness : csr_array, (m, m)
-        Rows sum to zero again.
-    unsure : ndarray, (m,) bool
-        Points that are not trusted, or would be alone or with a few others: they are no sheet, but may have normals of
-        the wrong sign, and stay with that sheet which they are coupled with most.
+    Where sheets lie closer than the points of each, single normals are wrong, and would join both sheets. Trust, (m,),
+    is as of `LaplaceBeltrami`. Return also the points that are not trusted, or would be alone or with a few others:
+    they are no sheet, but may have normals of the wrong sign, and stay with that sheet which they are coupled with
+    most. The stiffness has no positive numbers off its diagonal.
     """
     pairs = stiffness.tocoo()
     first, second = pairs.coords

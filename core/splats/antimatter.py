@@ -16,10 +16,7 @@ _RECORD = np.dtype([("place", "<f4", 3), ("scale", "<f4", 3), ("color", "u1", 4)
 def read_antimatter(path: Path) -> PlyVertices:
     """Read a .splat file as the columns of trainers.
 
-    Raises
-    ------
-    InvalidPointsError
-        Its size is not that of whole splats.
+    A size that is not that of whole splats raises `InvalidPointsError`.
     """
     size = os.stat(path).st_size
     if size % _RECORD.itemsize:

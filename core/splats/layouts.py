@@ -69,11 +69,7 @@ def remarks(names: Sequence[str]) -> Iterator[str]:
 def completed(columns: dict[str, Array]) -> tuple[dict[str, Array], list[str]]:
     """Return the columns as trainers write them, for columns that `hold_enough`, and how missing ones were completed.
 
-    Returns
-    -------
-    dict of str to ndarray, (n,)
-    list of str
-        Clauses for a notice.
+    The latter are clauses for a notice.
     """
     columns = dict(columns)
     return columns, [*filter(None, (add(columns) for add in (_add_colors, _add_opacity, _add_sizes, _add_rotations)))]

@@ -27,10 +27,7 @@ _SINGLE = np.float32
 def read_packed(path: Path) -> PlyVertices:
     """Read the splats of a packed PLY file as the columns of trainers.
 
-    Raises
-    ------
-    InvalidPointsError
-        Elements or properties are missing, or do not fit each other.
+    Elements or properties that are missing, or do not fit each other, raise `InvalidPointsError`.
     """
     order, comments, elements = read_elements(path)
     vertices, chunks = elements["vertex"], elements.get("chunk", {})

@@ -54,10 +54,8 @@ def is_spz(path: Path) -> bool:
 def read_spz(path: Path) -> PlyVertices:
     """Read an .spz file as the columns of trainers, in the file's own axes, of which y points upwards.
 
-    Raises
-    ------
-    InvalidPointsError
-        It is no .spz file, broken, of a later version, or would unpack to more bytes than splats ever do.
+    One that is no .spz file, broken, of a later version, or would unpack to more bytes than splats ever do raises
+    `InvalidPointsError`.
     """
     with open(path, "rb") as file:
         unpacked = _Unpacked(file)

@@ -36,15 +36,8 @@ _AROUND = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1], [-1, 0, 1], indexing="ij"
 def octaves_of(surface: ImplicitSurface, areas: Floats, usual: float) -> Ints:
     """Return by how many octaves the voxels at points are wider than usual, (m,) int: whose width is one.
 
-    All have the usual width where this takes little more than others would, and no dense part is lost.
-
-    Parameters
-    ----------
-    surface : ImplicitSurface
-    areas : ndarray, (m,)
-        Of the points.
-    usual : float
-        The spacing for which voxels have the usual width.
+    All have the usual width where this takes little more than others would, and no dense part is lost. `usual` is the
+    spacing for which voxels have that width; areas are those of the points, (m,).
     """
     spacing = surface.local_spacing / usual
     octaves: Ints = np.trunc(np.log2(np.maximum(spacing, 1e-300))).astype(int)

@@ -71,17 +71,8 @@ def _edges(faces: Ints, triangles: Bools) -> tuple[Array, Array, Array]:
 def _crossed(between: Ints, triangles: Ints, outside: int) -> Bools:
     """Choose the edges that ways between triangles cross: an odd number of each of them, an even number of others.
 
-    Parameters
-    ----------
-    between : ndarray, (e, 2) int
-        The faces on both sides of edges, the smaller one first.
-    triangles : ndarray, (t,) int
-    outside : int
-        What is beyond edges of one face, where any number of ways may end.
-
-    Returns
-    -------
-    ndarray, (e,) bool
+    Return which, (e,) bool. `between`, (e, 2), are the faces on both sides of edges, the smaller one first; `outside`
+    is what is beyond edges of one face, where any number of ways may end.
     """
     first, second = between.T
     code = first * (outside + 1) + second
@@ -113,18 +104,8 @@ def _crossed(between: Ints, triangles: Ints, outside: int) -> Bools:
 def _pairing(ends: Ints, length: Floats, count: int) -> Ints:
     """Choose short ways between nodes of which an odd number ends at each, any number at the last node.
 
-    Parameters
-    ----------
-    ends : ndarray, (w, 2) int
-        The smaller one first.
-    length : ndarray, (w,)
-    count : int
-        Of nodes.
-
-    Returns
-    -------
-    ndarray, (k,) int
-        Ways in a tree of the shortest ones.
+    Ends, (w, 2), are nodes, the smaller one first; lengths are (w,), and `count` is how many nodes there are. The ways
+    are in a tree of the shortest ones.
     """
     order = np.lexsort([length, ends[:, 1], ends[:, 0]])
     code = (ends[:, 0] * count + ends[:, 1])[order]

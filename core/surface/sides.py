@@ -15,26 +15,13 @@ _PAST = 1.0  # edges of the grid: how far beyond the boundary a surface has no s
 
 
 def find_sides(surface: ImplicitSurface, there: Heights, grid: Grid, around: bool) -> Floats:
-    """Find on which of two sides of a surface the corners of a grid near it are.
+    """Find on which of two sides of a surface the corners of a grid near it are, (c,): 1.0 or -1.0.
 
     Each edge between two corners votes whether its ends are on one side or on two, by the quadrics of the points next
     to them: by heights only, not by the signs of normals. The largest votes count first: positions are joined to
     groups, groups to larger ones by the sum of all edges between them, until none is left. So paths through the empty
-    space around thin parts count as much as those along the surface.
-
-    Parameters
-    ----------
-    surface : ImplicitSurface
-    there : Heights
-        Of the corners.
-    grid : Grid
-    around : bool
-        Whether paths through the empty space far from points count in full, as those around thin parts do; else little.
-
-    Returns
-    -------
-    ndarray, (c,)
-        1.0 on the side that most normals point to in each group of corners that edges join, -1.0 on the other.
+    space around thin parts count as much as those along the surface, if `around`; else those far from points count
+    little. Of each group of corners that edges join, most normals point to the side 1.0.
     """
     support = there.support
     parts = blocks(len(grid.first), _EDGES)
@@ -72,20 +59,8 @@ def _votes(surface: ImplicitSurface, there: Heights, support: Floats, grid: Grid
 def agreeing(count: int, first: Ints, second: Ints, votes: Floats) -> tuple[Floats, Ints]:
     """Choose signs that agree across edges of positive votes and differ across negative ones, the largest sums first.
 
-    Parameters
-    ----------
-    count : int
-        Of positions.
-    first, second : ndarray, (e,) int
-        The ends of edges.
-    votes : ndarray, (e,)
-
-    Returns
-    -------
-    sign : ndarray, (count,)
-        1.0 or -1.0.
-    group : ndarray, (count,) int
-        The same number for positions that edges join.
+    Edges have two ends and votes, (e,) each. Return the signs, 1.0 or -1.0, and groups, the same number for positions
+    that edges join, (count,) each.
     """
     sign, group, every = np.ones(count), np.arange(count), np.arange(count)
     while True:

@@ -148,26 +148,10 @@ def outside(points: Floats, low: Floats, high: Floats) -> Floats:
 
 
 def spacings_away(tree: cKDTree, usual: float, points: Floats, spacing: Floats, halo: float) -> tuple[Ints, Floats]:
-    """Find which points are in the halo of others, and how far from these.
+    """Find which points are in the halo of others, ascending, and how far from these.
 
-    Parameters
-    ----------
-    tree : cKDTree
-        Of the others.
-    usual : float
-        Their spacing.
-    points : ndarray, (k, 3)
-    spacing : ndarray, (k,)
-        Around these.
-    halo : float
-        In spacings.
-
-    Returns
-    -------
-    rows : ndarray, (m,) int
-        Which of the points, ascending.
-    away : ndarray, (m,)
-        How far, in their spacings or the usual one of the others if wider.
+    The tree is of the others, with the spacing `usual`; spacings around points are (k,). Distances are in these, or in
+    the usual one where that is wider; the halo is in spacings.
     """
     unit = np.maximum(np.maximum(spacing, usual), np.finfo(float).tiny)
     near = np.flatnonzero(outside(points, tree.mins, tree.maxes) / unit <= halo)  # no farther than from their box

@@ -94,10 +94,7 @@ def merge_labels(store: Store, step: str) -> Merged:
 def starts(store: Store, step: str, counts: Iterable[int]) -> Ints:
     """Return where the labels of each tile begin among those of all, by how many a step has told of each that it has.
 
-    Returns
-    -------
-    ndarray, (tiles + 1,) int
-        Up to the last tile that the step has been at.
+    They are (tiles + 1,), up to the last tile that the step has been at.
     """
     done = np.array(store.visited(step))
     length = np.zeros(done.max() + 2, dtype=np.int64)
@@ -112,22 +109,10 @@ def names_of(step: str, name: str, start: Ints, values: Array) -> Record:
 
 
 def agree_on_signs(first: Ints, second: Ints, votes: Floats, count: int) -> Floats:
-    """Choose signs of patches so that those that have points in common agree.
+    """Choose signs of patches, (count,), so that those that have points in common agree.
 
-    Parameters
-    ----------
-    first, second : ndarray, (k,) int
-        Two patches.
-    votes : ndarray, (k,)
-        Above zero where their normals agree, below where they do not. Those on the same two patches add up; where signs
-        cannot please all sums, the greatest count.
-    count : int
-        Patches.
-
-    Returns
-    -------
-    ndarray, (count,)
-        1 or -1.
+    Votes, (k,), between two patches each are above zero where their normals agree, below where they do not. Those on
+    the same two patches add up; where signs cannot please all sums, the greatest count.
     """
     ends = np.concatenate([first, second]).astype(np.int32), np.concatenate([second, first]).astype(np.int32)
     signs = sparse.csr_array((np.concatenate([votes, votes]), ends), shape=(count, count))  # sums all votes of a pair

@@ -12,11 +12,8 @@ _SHIFT = 44  # bits that are left out of the first look: 256 steps for each doub
 def median(parts: Callable[[], Iterable[Floats]]) -> float:
     """Return the median of numbers that are looked at twice.
 
-    Parameters
-    ----------
-    parts : callable
-        Returns an iterable of arrays of numbers that are not negative, (k,), the same each time. Those around the
-        median, about a hundredth of all, are held in memory.
+    `parts` returns an iterable of arrays of numbers that are not negative, (k,), the same each time. Those around the
+    median, about a hundredth of all, are held in memory.
     """
     total = np.zeros(1 << (64 - _SHIFT), dtype=np.int64)
     for part in parts():

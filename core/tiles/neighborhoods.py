@@ -156,10 +156,7 @@ def find_noise(site: Site, sample: Sample) -> tuple[Fitted, Told]:
 def agree_on_noise(store: Store, options: LaplacianOptions) -> Record:
     """Agree on whether there is noise to smooth, and on the middle of the points that fill volumes.
 
-    Raises
-    ------
-    NotASurfaceError
-        The points of many neighborhoods lie along a curve.
+    If the points of many neighborhoods lie along a curve, `NotASurfaceError` is raised.
     """
     count, curves, noisy, filling = np.sum(list(store.told("noise", "counts")), axis=0).tolist()
     check_surface(curves, count)

@@ -10,16 +10,9 @@ from .store import Part, Store
 
 
 def points_around(store: Store, place: Floats, count: int, marked: str = "") -> Part:
-    """Return so many points of all tiles that are next to the one at a place, nearest first.
+    """Return so many points of all tiles that are next to the one at a place, (3,), nearest first.
 
-    Parameters
-    ----------
-    store : Store
-    place : ndarray, (3,)
-        The point next to it is the middle.
-    count : int
-    marked : str
-        The middle is one of those that the step "noise" has marked under this name.
+    That is one of those that the step "noise" has marked under a name, if one is given.
     """
     return _nearest(store, _nearest(store, place, 1, marked).points[0], count)
 

@@ -20,20 +20,10 @@ _CELL = 8.0  # spacings: a surface seen from the front has some 64 points in a c
 
 
 def orientation(orient: str, viewpoint: Floats | None, columns: Iterable[str]) -> Record:
-    """Return what tiles agree on from the start for the sides of surfaces.
+    """Return what tiles agree on from the start for the sides of surfaces: "outside", "up" or "viewpoint".
 
-    Parameters
-    ----------
-    orient : {"outside", "up", "viewpoint"}
-    viewpoint : ndarray, (3,), optional
-        From `checked_viewpoint`.
-    columns : iterable of str
-        The names of what all points tell besides: the place of their scanner, if none is given.
-
-    Raises
-    ------
-    InvalidPointsError
-        Another choice, a viewpoint without need, or none.
+    A viewpoint is from `checked_viewpoint`; columns are the names of what all points tell besides: the place of their
+    scanner, if none is given. Another choice, a viewpoint without need, or none raise `InvalidPointsError`.
     """
     if orient not in ORIENTS:
         raise InvalidPointsError(f"Orientation {orient!r} is unknown. Choose one of {', '.join(ORIENTS)}.")
@@ -53,10 +43,7 @@ def orientation(orient: str, viewpoint: Floats | None, columns: Iterable[str]) -
 def checked_viewpoint(viewpoint: ArrayLike | None) -> Floats | None:
     """Check a place, (3,), and return it.
 
-    Raises
-    ------
-    InvalidPointsError
-        Another shape, no real numbers, or not finite.
+    Another shape, other than real numbers, or those that are not finite raise `InvalidPointsError`.
     """
     if viewpoint is None:
         return None
@@ -71,23 +58,9 @@ def tell_seen(site: Site, sample: Sample, rows: Ints, side: Floats, surface: Int
 
     From one place, or from above, a surface is seen where nothing of itself is before it: of the points of one surface
     in each cell of directions only the nearest counts. So a closed body shows its outer side, while all its points
-    together would face the inner one. By scanners all points are seen.
-
-    Parameters
-    ----------
-    site : Site
-    sample : Sample
-    rows : ndarray, (k,) int
-        The distinct points in the box.
-    side : ndarray, (k, 3)
-        Their normals, which agree within each surface.
-    surface : ndarray, (k,) int
-        The surface of each, by numbers of all tiles.
-
-    Returns
-    -------
-    dict
-        Surfaces, cells, distances, and the cosines between normals and the way to where they are seen from.
+    together would face the inner one. By scanners all points are seen. `rows`, (k,), are the distinct points in the
+    box, `side`, (k, 3), their normals, which agree within each surface, `surface`, (k,), its numbers of all tiles.
+    Surfaces, cells and distances are told, and the cosines between normals and the way to where they are seen from.
     """
     record, places = site.record, sample.places[rows]
     step = _CELL * float(record["spacing"])

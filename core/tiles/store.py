@@ -312,16 +312,8 @@ def write_manifest(
 ) -> None:
     """Write the manifest of a store, of which it is the last file.
 
-    Parameters
-    ----------
-    folder : pathlib.Path
-    options : LaplacianOptions
-    tiles : sequence of int
-        Points in each box.
-    agreed : dict
-        What is agreed on from the start.
-    known : dict
-        What else is told of the cloud.
+    `tiles` are the points in each box, `agreed` is what is agreed on from the start, `known` what else is told of the
+    cloud.
     """
     manifest = {
         "version": VERSION,
