@@ -46,18 +46,9 @@ def build(
     left_out: Array,
     progress: Progress,
 ) -> Built:
-    """Build the operator of points by the method of the options; the paper's has no boundary.
+    """Build the operator of points, (n, 3), by the method of the options; the paper's has no boundary.
 
-    Parameters
-    ----------
-    points : ndarray, (n, 3)
-    options : LaplacianOptions or PaperOptions
-    boundary : ndarray, (n,) bool, or None
-        The boundary points; None leaves it to the options.
-    left_out : ndarray, (m,) int
-        Splats that are left out.
-    progress : callable
-        Called as ``progress(stage, fraction)``.
+    Boundary points are (n,) bool; None leaves them to the options. Splats in `left_out`, (m,), take no part.
     """
     given: dict[str, Any] = {"left_out": left_out, "progress": progress}
     if isinstance(options, core.PaperOptions):
@@ -88,20 +79,7 @@ def floating_notices(out: Array) -> list[str]:
 
 
 def resolved_modes(laplacian: core.LaplaceBeltrami, modes: int, progress: Progress) -> tuple[core.Spectrum, list[str]]:
-    """Compute modes of an operator, or as many of them as the points resolve, with a notice.
-
-    Parameters
-    ----------
-    laplacian : LaplaceBeltrami
-    modes : int
-    progress : callable
-
-    Returns
-    -------
-    Spectrum
-    list of str
-        Notices.
-    """
+    """Compute modes of an operator, or as many of them as the points resolve, with a notice."""
     try:
         return laplacian.eigenpairs(modes, progress=progress), []
     except core.UnresolvedModesError as error:
@@ -114,25 +92,10 @@ def resolved_modes(laplacian: core.LaplaceBeltrami, modes: int, progress: Progre
 def continued(
     spectrum: core.Spectrum, areas: Array, points: Array, earlier: tuple[core.Spectrum, Array] | None
 ) -> tuple[core.Spectrum, Array, tuple[core.Spectrum, Array]]:
-    """Match modes to those of the frame before.
+    """Match modes to those of the frame before; return them, how well each continues, see `match_modes`, and `earlier`.
 
-    Parameters
-    ----------
-    spectrum : Spectrum
-        Of a subset, fewer modes may be transferred than there are eigenvalues.
-    areas : ndarray, (n,)
-    points : ndarray, (n, 3)
-        All points of the object, in the world.
-    earlier : tuple of Spectrum and ndarray, or None
-        The third result for the frame before; None for the first frame, which is not changed.
-
-    Returns
-    -------
-    Spectrum
-    ndarray, (count,)
-        How well each mode continues, see `match_modes`.
-    tuple
-        For the next frame.
+    Of a subset, fewer modes may be transferred than there are eigenvalues. Points are all of the object, in the world.
+    `earlier` is for the next frame; the first frame has None, and is not changed.
     """
     count = spectrum.eigenvectors.shape[1]
     spectrum, overlaps = replace(spectrum, eigenvalues=spectrum.eigenvalues[:count]), np.ones(count)
@@ -176,14 +139,8 @@ def figures(measures: Mapping[str, Array], spectrum: core.Spectrum | None) -> di
 def arrays(place: Array, built: Built, spectrum: core.Spectrum | None) -> dict[str, Array]:
     """Return all arrays of an analysis, in double precision, in lengths and axes of the world.
 
-    Those of the stiffness matrix have the names of scipy.sparse.save_npz, so that scipy.sparse.load_npz reads it.
-
-    Parameters
-    ----------
-    place : ndarray, (3,)
-        Offset of the points of the operator from those of the file.
-    built : Built
-    spectrum : Spectrum or None
+    Those of the stiffness matrix have the names of scipy.sparse.save_npz, so that scipy.sparse.load_npz reads it. The
+    place, (3,), is the offset of the operator's points from those of the file.
     """
     laplacian, stiffness = built.laplacian, built.laplacian.stiffness
     return {

@@ -108,17 +108,8 @@ def with_own(arguments: Namespace, given: Given) -> Namespace:
 def read_file(path: Path, columns: str = "", las: core.files.LasChoices | None = None) -> Given:
     """Read a file, as splats if it holds splats.
 
-    Parameters
-    ----------
-    path : pathlib.Path
-    columns : str
-        Names of the columns of a file of text; empty to find them.
-    las : LasChoices
-        Which points of LAS files are read; None for all that are not withheld.
-
-    Returns
-    -------
-    Splats or PointTable
+    Columns are the names of those of a file of text; empty to find them. Of LAS files all points are read that are not
+    withheld, if nothing else is chosen.
     """
     if hint(path):
         raise core.PointCloudError(f"{path} cannot be read.{hint(path)}")
@@ -207,17 +198,9 @@ class Cloud:
 
 
 def moved(given: Given, points: Array, matrix: Array, place: Array) -> Given:
-    """Return what a file holds after a motion.
+    """Return what a file holds after a motion, (4, 4), with one factor of size.
 
-    Parameters
-    ----------
-    given : PointTable or Splats
-    points : ndarray, (n, 3)
-        Its positions less a place.
-    matrix : ndarray, (4, 4)
-        Of the motion of these, with one factor of size.
-    place : ndarray, (3,)
-        To which the result is relative.
+    It moves the positions, (n, 3), less a place, to which the result is relative, too.
     """
     linear, after = matrix[:3, :3], points @ matrix[:3, :3].T + matrix[:3, 3] + place
     if given.owner is not None:
@@ -247,26 +230,11 @@ def write(
     arrays: Mapping[str, Array] | None = None,
     numbers: Mapping[str, Array] | None = None,
 ) -> list[str]:
-    """Write points or splats with results to a file of a kind in `outputs`.
+    """Write points or splats with results to a file of a kind in `outputs`; return notices of what has another form.
 
-    Of a kind beside those of core they are put into the open file, which is saved at the end.
-
-    Parameters
-    ----------
-    path : pathlib.Path
-    given : PointTable or Splats
-        In the coordinates of the file.
-    results : dict of str to ndarray
-        By the names of attributes.
-    arrays : dict of str to ndarray, optional
-        For .npz files, if not the points and results.
-    numbers : dict of str to ndarray, optional
-        Further results, which are not at the points, by name: .npz files and objects hold them.
-
-    Returns
-    -------
-    list of str
-        Notices of what is written in another form.
+    Of a kind beside those of core they are put into the open file, which is saved at the end. What is given is in the
+    coordinates of the file, results are by the names of attributes. `arrays` are for .npz files, if not the points and
+    results; `numbers`, which .npz files and objects hold, are further results that are not at the points.
     """
     if kind_of(path) is not None:
         return given.owner.write(given, results, numbers or {})
@@ -286,14 +254,7 @@ def write(
 
 
 def with_results(given: core.files.PointTable, results: Mapping[str, Array]) -> core.files.PointTable:
-    """Return a table with results as further columns, in single precision; normals under the name that files have.
-
-    Parameters
-    ----------
-    given : PointTable
-    results : dict of str to ndarray
-        By the names of attributes.
-    """
+    """Return a table with results as further columns, in single precision; normals under the name that files have."""
     attributes = {**given.attributes, **{name: _narrow(values) for name, values in results.items()}}
     if quantities.NORMAL in results:
         attributes.pop(_FILE_NORMAL, None)

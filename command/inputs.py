@@ -145,12 +145,7 @@ def _others(folder: Path, taken: list[Path], verb: FileVerb, arguments: argparse
 
 
 def check_outputs(verb: FileVerb, arguments: argparse.Namespace) -> None:
-    """Refuse to begin where an output cannot be written, or a package for it is missing.
-
-    Raises
-    ------
-    PointCloudError
-    """
+    """Refuse to begin, by `PointCloudError`, where an output cannot be written, or a package for it is missing."""
     written = [path for one in arguments.inputs for path in outputs_of(verb, one, arguments)]
     written += verb.written_once(arguments)
     folders = {path.parent: path for path in written}

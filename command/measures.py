@@ -68,18 +68,8 @@ def base_of(
 ) -> Base | None:
     """Return the `Base` that options give, None for none.
 
-    Parameters
-    ----------
-    plane, normal : ndarray, (3,), or None
-        A position in the coordinates of the file, and a vector across the plane; else upwards.
-    place : ndarray, (3,)
-        Less which the points are.
-    ground : callable or None
-        See `Base`.
-    ground_place : ndarray, (3,)
-        Less which the points of the other cloud are.
-    name : str
-        Of the other cloud.
+    The plane goes through a position in the coordinates of the file; the normal is upwards if none is given. Points are
+    less `place`, (3,), those of the other cloud less `ground_place`.
     """
     if plane is None and ground is None:
         return None
@@ -119,12 +109,8 @@ def volumes_over(
 ) -> tuple[list[dict[str, Any]], list[str]]:
     """Measure the volumes of parts over a `Base`.
 
-    Returns
-    -------
-    list of dict
-        Of each of the rows of a table of parts, by name; empty without a base.
-    list of str
-        Notices, which name the part.
+    Return them by name for each of the rows of a table of parts, empty without a base; and notices, which name the
+    part.
     """
     if base is None:
         return [{} for _ in rows], []

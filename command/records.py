@@ -97,16 +97,9 @@ class Records:
         _append(arguments.report.with_suffix(_PLANS), plan)
 
     def keep(self, path: Path, line: dict[str, Any], seconds: float, read: dict[str, list[int] | None]) -> None:
-        """Append the record of an input to the report, if there is one.
+        """Append the record of an input to the report, if there is one, with what is printed of it.
 
-        Parameters
-        ----------
-        path : pathlib.Path
-        line : dict
-            What is printed of it.
-        seconds : float
-        read : dict
-            The result of `read_stamps` before it was read.
+        `read` is the result of `read_stamps` before it was read.
         """
         if self._arguments.report is None:
             return
@@ -163,18 +156,9 @@ def _ends_line(file: IO[bytes]) -> bool:
 
 
 def read_reports(folder: Path) -> tuple[list[dict[str, Any]], int]:
-    """Read all records in the reports of a folder.
+    """Read all records in the reports of a folder, in the order in which they ended.
 
-    Parameters
-    ----------
-    folder : pathlib.Path
-
-    Returns
-    -------
-    list of dict
-        All records in the order in which they ended.
-    int
-        How many lines are no records: of writers that were killed.
+    Return also how many lines are no records: of writers that were killed.
     """
     lines = list(_lines(folder, SUFFIX))
     found = [line for line in lines if line.keys() >= _NEEDED]
@@ -201,12 +185,7 @@ def _lines(folder: Path, ending: str) -> Iterator[dict[str, Any]]:
 def last_records(records: Sequence[dict[str, Any]], plans: Sequence[dict[str, Any]] = ()) -> list[dict[str, Any]]:
     """Return the last record of each verb on each file by their paths, or that it was planned and not reached.
 
-    Parameters
-    ----------
-    records : sequence of dict
-        In the order in which they ended.
-    plans : sequence of dict
-        In the order in which they began.
+    Records are in the order in which they ended, plans in that in which they began.
     """
     last = {(record["path"], record["verb"]): record for record in records}
     planned = {(path, plan["verb"]): plan for plan in plans for path in plan["planned"]}

@@ -24,24 +24,9 @@ _LINE, _BAND, _GRID = "#1f5f9f", "#c5d9ec", "#e4e4e4"  # colors
 
 
 def profile_picture(table: str, settings: Any) -> str:
-    """Draw the last values of a table of *Profile* over the distance.
+    """Draw the last values of a table of *Profile*, as the tool writes it, over the distance: return an SVG document.
 
-    Parameters
-    ----------
-    table : str
-        As the tool writes it.
-    settings : bpy.types.UnitSettings
-        Of the scene; or `NO_UNITS`.
-
-    Returns
-    -------
-    str
-        An SVG document.
-
-    Raises
-    ------
-    PointCloudError
-        The text holds something else.
+    The units are those of a scene in Blender, or `NO_UNITS`. A text that holds something else raises `PointCloudError`.
     """
     lines = table.splitlines()
     try:

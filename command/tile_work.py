@@ -102,17 +102,9 @@ class Sources:
     def __call__(self, progress: Callable[[float], None]) -> Iterator[tuple[Array, dict[str, Array]]]:
         """Yield points, and their other numbers.
 
-        Parameters
-        ----------
-        progress : callable
-            Called with the share that has been read, by the sizes of files, and of points within them.
-
-        Raises
-        ------
-        Incomplete
-            A file broke off after points of it were given. It is left out the next time.
-        PointCloudError
-            None of the files can be read.
+        `progress` is called with the share that has been read, by the sizes of files, and of points within them. If a
+        file breaks off after points of it were given, `Incomplete` is raised: it is left out the next time. If none of
+        the files can be read, `PointCloudError` is.
         """
         self.notices, channels = [], [np.zeros(0)]
         total, before = max(sum(self._sizes.values()), 1), 0
@@ -237,12 +229,7 @@ def one_by_one(function: Callable[..., Any], many: Iterable[tuple[Any, ...]]) ->
 
 
 def check_workers(count: int, address: str, folder: Path) -> None:
-    """Refuse to begin where Dask is missing, or workers of a cluster that do not see a folder, or no cluster at all.
-
-    Raises
-    ------
-    PointCloudError
-    """
+    """Raise `PointCloudError` where Dask or a cluster is missing, or workers of it do not see a folder."""
     if count > 1 or address:
         _imported()
     if not address:
@@ -309,18 +296,9 @@ def _brief(error: Exception) -> str:
 def workers(count: int, address: str) -> Iterator[Spread]:
     """Provide a function that calls another with a folder, and each of some arguments, on all workers.
 
-    Parameters
-    ----------
-    count : int
-        Processes on this machine; with one, and no address, all is done in this one.
-    address : str
-        Of the scheduler of a Dask cluster, or empty.
-
-    Yields
-    ------
-    callable
-        Takes a function and tuples of arguments, and yields its results as they come. It may raise
-        `NotEnoughMemoryError`, and a PointCloudError where the cluster fails.
+    Those are processes on this machine, or of the Dask cluster whose scheduler has an address. With one, and no
+    address, all is done in this process. The function yields results as they come. It may raise `NotEnoughMemoryError`,
+    and a PointCloudError where the cluster fails.
     """
     if count == 1 and not address:
         yield one_by_one
@@ -441,13 +419,7 @@ def totals(store: core.tiles.Store, records: list[dict[str, Any]]) -> dict[str, 
 
 
 def bytes_of(text: str) -> int:
-    """Parse a size such as 2GB or 500MB as bytes.
-
-    Raises
-    ------
-    ValueError
-        It is something else.
-    """
+    """Parse a size such as 2GB or 500MB as bytes; something else raises ValueError."""
     units = {"B": 1, "KB": 1 << 10, "MB": 1 << 20, "GB": 1 << 30, "TB": 1 << 40}
     number = text.strip().upper()
     unit = next((unit for unit in ("KB", "MB", "GB", "TB", "B") if number.endswith(unit)), "")

@@ -96,24 +96,10 @@ def matched(
     progress: Progress,
     members: Sequence[Array] | None = None,
 ) -> Match:
-    """Find the places of points on the surface of others.
+    """Find the places of points of some name on the surface of others.
 
-    Parameters
-    ----------
-    laplacian : LaplaceBeltrami
-    sources : list of LaplaceBeltrami
-    offsets : ndarray, (k, 3)
-        From the points of the operator to those of each source.
-    own : object
-        With the values of the settings in `MATCH` as its attributes.
-    name : str
-        Of the points, for errors and notices.
-    names : list of str
-        Of the sources.
-    progress : callable
-        Called as ``progress(stage, fraction)``.
-    members : ndarray, (n,) bool, optional
-        See `match_surface`.
+    Offsets, (k, 3), lead from the points of the operator to those of each source; `own` has the values of the settings
+    in `MATCH` as its attributes. For `members` see `match_surface`.
     """
     places = core.rig.match_surface(
         laplacian,

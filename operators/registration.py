@@ -39,14 +39,7 @@ def registered() -> tuple:
 
 
 def groups(kind: str, home: str) -> list:
-    """Return the tools with a row in a panel or a menu, in order, as lists by group.
-
-    Parameters
-    ----------
-    kind : {"panel", "menu", "quick"}
-    home : str
-        Of the rows.
-    """
+    """Return the tools with a row in a home of a kind, "panel", "menu" or "quick", in order, as lists by group."""
     rows = [(getattr(tool, kind), tool) for tool in _registered]
     rows = sorted(((row, tool) for row, tool in rows if row and row.home == home), key=lambda pair: pair[0])
     return [[tool for _, tool in group] for _, group in groupby(rows, lambda pair: pair[0].group)]

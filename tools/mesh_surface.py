@@ -76,21 +76,9 @@ def carried_mesh(laplacian: Laplacian, detail: float, progress: Progress) -> tup
 
 
 def close_gaps(faces: Array, most: int = GAP) -> tuple[Array, int]:
-    """Close the small holes of a mesh by triangles.
+    """Close the small holes of a mesh, of so many edges at most, by triangles, oriented as the faces are, (t, 3) int.
 
-    Parameters
-    ----------
-    faces : ndarray, (q, k) int
-        Oriented alike.
-    most : int
-        Edges around the largest hole that is closed.
-
-    Returns
-    -------
-    ndarray, (t, 3) int
-        The triangles, oriented as the faces are.
-    int
-        How many edges of one face are left.
+    Faces, (q, k), are oriented alike. Return also how many edges of one face are left.
     """
     begin, end = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2).T.astype(np.int64)
     count = int(faces.max(initial=-1)) + 1

@@ -147,14 +147,9 @@ def find_touched(laplacian: Laplacian, chosen: Chosen, places: list[Array], leng
 
 
 def frame_rows(laplacian: Laplacian, chosen: Chosen, progress: Progress) -> tuple[Iterator[Array], float]:
-    """Simulate frame by frame.
+    """Simulate frame by frame: return an iterator of the frames that are kept, (n,) each, without end.
 
-    Returns
-    -------
-    iterator of ndarray, (n,)
-        The frames that are kept, without end.
-    float
-        How far the motion goes, or the size of a pattern.
+    Return also how far the motion goes, or the size of a pattern.
     """
     return {"HEAT": _heat, "WAVE": _wave, "REACTION": _reaction, "FRONT": _front}[chosen.kind](
         laplacian, chosen, progress

@@ -66,17 +66,9 @@ class MESHFREE_PT_deform(SidebarPanel, bpy.types.Panel):
 
 
 def draw_binding(layout, context, obj, bind: str, without=()):
-    """Draw the state of a bound object, and what can be done with it.
+    """Draw the state of a bound object, and what can be done with it, without some tools, by their names.
 
-    Parameters
-    ----------
-    layout : bpy.types.UILayout
-    context : bpy.types.Context
-    obj : bpy.types.Object
-    bind : str
-        The operator that binds it again.
-    without : sequence of str
-        Names of tools that are not drawn.
+    `bind` is the operator that binds it again.
     """
     _draw_state(layout, context, obj)
     layout.operator(bind, text="Bind Again")

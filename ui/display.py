@@ -112,17 +112,10 @@ def step_colors(obj) -> dict:
 
 
 def shown_values(obj):
-    """Read the numbers that an object shows as colours, in the same order as its points.
+    """Read the numbers that an object shows as colours, in the same order as its points, (n,).
 
-    Returns
-    -------
-    ndarray, (n,), or None
-        None where vectors are shown as directions, or nothing is.
-
-    Raises
-    ------
-    PointCloudError
-        The attribute on show is gone, or holds neither numbers nor vectors on points.
+    None where vectors are shown as directions, or nothing is. If the attribute on show is gone, or holds neither
+    numbers nor vectors on points, `PointCloudError` is raised.
     """
     name = shown_attribute(obj)
     return numbers(read_attribute(obj.data, name), component(name, obj.meshfree)) if name else None

@@ -11,15 +11,7 @@ _LISTED = 5  # objects that are named
 
 
 def draw_follow(layout, context, obj):
-    """Draw how an object follows an armature, or what follows one.
-
-    Parameters
-    ----------
-    layout : bpy.types.UILayout
-    context : bpy.types.Context
-    obj : bpy.types.Object or None
-        The active object: points, or an armature.
-    """
+    """Draw how the active object, points or an armature, follows an armature, or what follows it."""
     if obj is not None and obj.type == "ARMATURE":
         _draw_followers(layout, context, obj)
     if obj is None or obj.type not in TYPES or not (is_bound(obj) and obj.meshfree.deform.kind == Bones.name):

@@ -35,16 +35,8 @@ def rounded(value: float, uncertainty: float) -> tuple:
 def columns(obj, settings) -> list:
     """Return the columns of an object's table as texts: title with the unit, and a pair of texts for each part.
 
-    Parameters
-    ----------
-    obj : bpy.types.Object
-    settings : bpy.types.UnitSettings
-        Of the scene.
-
-    Returns
-    -------
-    list of tuple
-        Title, and pairs of a number and its uncertainty, which is empty where there is none, for each part.
+    Units are as the settings of a scene say. A pair is a number and its uncertainty, which is empty where there is
+    none.
     """
     rows, attribute = kept_rows(obj), obj.meshfree.part_attribute
     label = quantity(attribute).label or attribute

@@ -88,12 +88,8 @@ def _new_display():
 def _thinned(tree, given, parts):
     """Add the nodes that choose which points the viewport draws.
 
-    They are chosen at random, so that no pattern of a scanner shows, and cover what all would.
-
-    Returns
-    -------
-    drawn, larger, many : bpy.types.Node
-        Whether a point is drawn, by what its radius grows, and whether there are too many for discs.
+    They are chosen at random, so that no pattern of a scanner shows, and cover what all would. Return the nodes that
+    tell whether a point is drawn, by what its radius grows, and whether there are too many for discs.
     """
     most = given[MOST]
     limited = tree.math("MULTIPLY", tree.math("GREATER_THAN", most, 0.0), tree.node("GeometryNodeIsViewport"))

@@ -71,21 +71,10 @@ def _histogram(obj, scale):
 
 
 def arrange(sizes, left, bottom, right, top, indent=0.0) -> list:
-    """Place pictures from the lower right corner to the left, in rows upwards.
+    """Place pictures of some widths and heights from the lower right corner to the left, in rows upwards.
 
-    Parameters
-    ----------
-    sizes : list of (float, float)
-        Widths and heights.
-    left, bottom, right, top : float
-        The available room.
-    indent : float
-        Free width at the right of upper rows.
-
-    Returns
-    -------
-    list of (float, float), or None in their place
-        Lower left corners; None without room.
+    They are within the room from left to right and bottom to top, upper rows with an indent at the right. Return their
+    lower left corners; None for those without room.
     """
     places, x, y, row = [], right, bottom, 0.0
     for width, height in sizes:
@@ -201,15 +190,7 @@ def seen_places(context, obj):
 def least_covering(corners, size, places, now: int) -> int:
     """Choose where a rectangle covers the fewest places, (k, 2); it stays at its present corner unless another is free.
 
-    Parameters
-    ----------
-    corners : list of (float, float)
-        Lower left ones.
-    size : (float, float)
-    places : ndarray, (k, 2)
-        NaN where they are not seen.
-    now : int
-        Which of the corners it is at.
+    Corners are lower left ones; places that are not seen are NaN.
     """
     inside = [((places >= corner) & (places <= np.add(corner, size))).all(axis=1) for corner in corners]
     covered = np.array([np.count_nonzero(each) for each in inside])

@@ -97,17 +97,8 @@ def histogram_picture(scale, edges, counts, beyond) -> Picture:
 def spectrum_picture(eigenvalues, shown_mode: int, unit: str, factor: float, area: float) -> Picture:
     """Draw eigenvalues over their numbers, and for comparison those of Weyl's law.
 
-    Parameters
-    ----------
-    eigenvalues : ndarray, (k,)
-    shown_mode : int
-        Number of the mode on show, from 1; 0 for none.
-    unit : str
-        Of the numbers; empty for none.
-    factor : float
-        Conversion of eigenvalues to that unit.
-    area : float
-        Total area of the surface, for Weyl's law: about 4 pi k / area; 0 leaves it out.
+    The mode on show has a number from 1; 0 for none. Eigenvalues times the factor are in the unit; an empty one is
+    none. Weyl's law, about 4 pi k / area, is left out for an area of 0.
     """
     picture = Picture(300.0, HEIGHT)
     top = _title(picture, "Eigenvalues", unit) - 0.5 * _LINE

@@ -71,21 +71,11 @@ _NO_SPACING = 0.01  # for points too few to have one
 
 
 def show_attribute(obj, name: str = "", radius: float = 0.0):
-    """Show an attribute as colours on the points, by the display settings of the object.
+    """Show an attribute of an object as colours on the points, by its display settings.
 
-    Parameters
-    ----------
-    obj : bpy.types.Object
-        A mesh object.
-    name : str
-        The attribute; empty for the one on show, or the mean curvature.
-    radius : float
-        Radius of the points in local lengths; 0 for the setting Point Size, or a radius set by hand.
-
-    Raises
-    ------
-    PointCloudError
-        There is no such attribute, or it holds neither numbers nor vectors nor colors on points.
+    Without a name it is the one on show, or the mean curvature. The radius of the points is in local lengths; 0 for the
+    setting Point Size, or a radius set by hand. Attributes that are not there, or hold neither numbers nor vectors nor
+    colors on points, raise `PointCloudError`.
     """
     if not name:
         name = shown_attribute(obj)

@@ -25,15 +25,8 @@ _BOUNDS = -3e38, 3e38  # of single precision: larger gradients are clipped
 def follow(obj, name, part, columns, spacing):
     """Write the gradients of an object's displayed values, if there are discs that can show them.
 
-    Parameters
-    ----------
-    obj : bpy.types.Object
-    name, part : str
-        The displayed attribute, and the part of it.
-    columns : sequence of ndarray, (n,)
-        The displayed numbers, one or two for each point; empty where they have no gradient.
-    spacing : float
-        Of the points: the length in which discs are kept.
+    Name and part are those on display; columns are the numbers, one or two for each point, empty where they have no
+    gradient. The spacing of the points is the length in which discs are kept.
     """
     kept, data = obj.meshfree, obj.data
     if not _is_writable(data):  # as in Edit Mode: earlier gradients are valid for the same attribute

@@ -52,20 +52,8 @@ def direction_colors(vectors):
 def follow(obj, values, colors_of, radius):
     """Write the colours of an object's displayed values, and return the colour attribute that shows them.
 
-    Parameters
-    ----------
-    obj : bpy.types.Object
-    values : ndarray, (n,) or (n, 3)
-        The numbers or directions.
-    colors_of : callable, or None
-        Gives their colours, (n, 4); None if Solid cannot show them.
-    radius : float
-        Of discs, in local lengths.
-
-    Returns
-    -------
-    str
-        The colour attribute that viewports in Solid show; empty if none is changed.
+    Its name is empty if none is changed. Values are numbers or directions, (n,) or (n, 3), whose colours, (n, 4), a
+    function gives; None if Solid cannot show them. The radius of discs is in local lengths.
     """
     data = obj.data
     if obj.type != "MESH" or in_edit_mesh(obj) or not data.is_editable or data.override_library is not None:

@@ -81,14 +81,8 @@ def all_zero(values) -> bool:
 def histogram(values, bounds, stepped: bool):
     """Count values along an axis of the range, extended by at most half its width on each side.
 
-    Returns
-    -------
-    ndarray, (b + 1,)
-        Edges of the bins; one for each whole number where these have a colour each.
-    ndarray, (b,)
-        How many values each holds.
-    tuple of int
-        How many values lie below and above the range.
+    Return the edges of the bins, (b + 1,), one for each whole number where these have a colour each; how many values
+    each holds, (b,); and how many lie below and above the range.
     """
     values = values[np.isfinite(values)].astype(np.float64)
     low, high = bounds

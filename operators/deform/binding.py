@@ -112,19 +112,8 @@ def read_rest(obj):
 def record(obj, kind: str, rest, matrix, groups: str, left_out=()):
     """Write what all kinds of bindings keep in the file.
 
-    Parameters
-    ----------
-    obj : bpy.types.Object
-    kind : str
-        Name of the kind.
-    rest : ndarray, (n, 3) float32
-        Points at rest in local space.
-    matrix : ndarray, (3, 3)
-        From local space to world lengths.
-    groups : str
-        Checksum of the groups or weights that were bound.
-    left_out : sequence of int
-        Points that may be moved, see `renew`.
+    Points at rest, (n, 3) float32, are in local space, from which the matrix, (3, 3), leads to world lengths. `groups`
+    is a checksum of the groups or weights that were bound; points in `left_out` may be moved, see `renew`.
     """
     settings = obj.meshfree.deform
     write_attribute(obj.data, REST, rest)

@@ -85,19 +85,11 @@ class Follower:
         return self
 
     def move(self, pose: HandlePose, discs, state: State, start=None, progress=None) -> Moved:
-        """Solve for all points in a pose.
+        """Solve for all points in a pose: exactly for the state SETTLED, by one step for QUICK.
 
-        Parameters
-        ----------
-        pose : HandlePose
-        discs : ndarray, (n, 3), or None
-            Of the display at rest, normals times radii, to be deformed with the points.
-        state : State
-            SETTLED, or QUICK for one step.
-        start : ndarray, (n, 3), optional
-            The last points, from which that step starts; otherwise from rest.
-        progress : callable, optional
-            Required where it may have to factorize.
+        That step starts from the last points, (n, 3), if there are some, or from rest. Discs of the display at rest,
+        normals times radii, (n, 3), deform with the points. A progress callback is required where it may have to
+        factorize.
         """
         bound, rest, handles = self.binding, self.quick.points, self.binding.handles(pose)
         if _is_at_rest(bound, handles):

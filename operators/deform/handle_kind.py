@@ -133,13 +133,7 @@ class Handles:
 def record(obj, rest, matrix, constraints, empties):
     """Write the binding of an object to the file: the first three fields of a `Binding`.
 
-    Parameters
-    ----------
-    obj : bpy.types.Object
-    rest, matrix, constraints
-        As of `Binding`.
-    empties : list
-        For each group of handles its empty and the matrix of that at rest in local space, (4, 4), or None.
+    `empties` has for each group of handles its empty and the matrix of that at rest in local space, (4, 4), or None.
     """
     settings = obj.meshfree.deform
     settings.handle_items.clear()

@@ -120,10 +120,7 @@ def plan_binding(obj, rest, matrix, constraints=None) -> Binding:
 def read_constraints(obj) -> Constraints:
     """Read the handles and anchors of an object.
 
-    Raises
-    ------
-    PointCloudError
-        There are no handles, or points that are in several groups.
+    Without handles, or with points in several groups, `PointCloudError` is raised.
     """
     settings = obj.meshfree.deform
     names = handle_names(obj) or [settings.handles]  # whose error names the missing group

@@ -157,14 +157,8 @@ def write(obj, follower, moved, pose):
 def update(obj, depsgraph=None, wanted=State.SETTLED):
     """Let a bound object follow, if what it follows has moved and the binding holds.
 
-    Parameters
-    ----------
-    obj : bpy.types.Object
-    depsgraph : bpy.types.Depsgraph, optional
-        Where that is read; otherwise as the viewport shows them.
-    wanted : State
-        SETTLED at any cost; PREPARING to leave missing factors to the timer; QUICK for one step only, with the rest
-        left to the timer.
+    That is read where a depsgraph has it, otherwise as the viewport shows it. The wanted state is SETTLED at any cost;
+    PREPARING to leave missing factors to the timer; QUICK for one step only, with the rest left to the timer.
     """
     if stale_reason(obj, glance=wanted is not State.SETTLED, trusting=wanted is State.QUICK):
         return

@@ -54,18 +54,10 @@ def show_live(modifier):
 
 
 def show_baked(modifier, cache, first: int, frames: int, kept):
-    """Let a modifier show a baked animation.
+    """Let a modifier show a baked animation of so many frames, from the first one on.
 
-    Parameters
-    ----------
-    modifier : bpy.types.NodesModifier
-    cache : bpy.types.Object
-        Its attributes "0", "1" and so on hold the displacements of all points from the first frame on, those named
-        by `baked_suffix` after these what goes along.
-    first, frames : int
-        The first frame, and how many there are.
-    kept : sequence of Carried
-        What goes along.
+    Attributes "0", "1" and so on of the cache, an object, hold the displacements of all points, those named by
+    `baked_suffix` after these what goes along, `kept`.
     """
     kind = _kind(_BAKED, kept)
     modifier.node_group = _group(kind) or _baked_group(kind, kept)
@@ -155,13 +147,7 @@ def _mix(tree, share, first, second, data_type):
 def add_shape(obj, name, kept):
     """Give an object a modifier that shows a stored deformation by its value, as a shape key does, which is 0 at first.
 
-    Parameters
-    ----------
-    obj : bpy.types.Object
-    name : str
-        Of the attribute with the displacements; by `stored_name` of those with what goes along.
-    kept : sequence of Carried
-        What goes along.
+    The name is that of the attribute with the displacements; by `stored_name` of those with what goes along, `kept`.
     """
     share = (VALUE, "Float", "Share of the stored deformation that is shown", {**_SHARE, "default_value": 0.0})
     group = new_group(name, SHAPE_TAG, (share,))

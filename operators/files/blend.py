@@ -257,10 +257,7 @@ def add_options(parser):
 def read(path, name, option, arguments):
     """Open a file, and return the points or splats of one of its objects, as `Kind` says.
 
-    Raises
-    ------
-    PointCloudError
-        The file or the object is missing, or has no points.
+    If the file or the object is missing, or has no points, `PointCloudError` is raised.
     """
     if not path.is_file():
         raise PointCloudError(f"There is no file {path}. Check its name and folder.")

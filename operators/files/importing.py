@@ -177,10 +177,7 @@ class MESHFREE_OT_import_points(ImportOperator, bpy.types.Operator):
 def _read_all(paths, columns, choices, surface, progress):
     """Read files, kept ones from memory, since Adjust Last Operation imports again.
 
-    Returns
-    -------
-    list of (PointTable, ndarray or str or None)
-        Each table with the discs of its points, if requested, or why there are none.
+    Return each table with the discs of its points, if requested, or why there are none.
     """
     tables = []
     for number, path in enumerate(paths):

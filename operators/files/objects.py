@@ -40,23 +40,10 @@ def file_filter(*suffixes):
 
 
 def add_object(name, table, collection, known=None, with_attributes=True):
-    """Add an object of loose vertices.
+    """Add an object of loose vertices to a collection, with other columns or without, and return it.
 
-    Its coordinates are those of the table, less an offset that the object keeps in double precision.
-
-    Parameters
-    ----------
-    name : str
-    table : PointTable
-    collection : bpy.types.Collection
-    known : ndarray, (3,), optional
-        The offset of other objects, shared if the points are near enough.
-    with_attributes : bool
-        Whether to add the other columns.
-
-    Returns
-    -------
-    bpy.types.Object
+    Its coordinates are those of the table, less an offset that the object keeps in double precision: `known`, that of
+    other objects, if the points are near enough.
     """
     origin = choose_origin(table.points, known, degrees=table.degrees)
     mesh = bpy.data.meshes.new(name)
@@ -125,21 +112,10 @@ def _fit(values):
 def point_table(context, obj, attributes="ALL", with_colors=True) -> PointTable:
     """Return an object's displayed points, in world space without the import offset, with attributes.
 
-    Parameters
-    ----------
-    context : bpy.types.Context
-    obj : bpy.types.Object
-    attributes : {"ALL", "RESULTS", "NONE"}
-        RESULTS are those of this extension alone.
-    with_colors : bool
-        Whether to include the color attribute.
-
-    Returns
-    -------
-    PointTable
-        With normals and scanner positions in world space. Of LAS files, coordinates that Blender has rounded only are
-        those of the file again. `single` says whether single precision resolves the
-        coordinates; notices name the columns in doubt.
+    These are "ALL", "NONE", or "RESULTS", those of this extension alone; colors are asked for apart. Normals and
+    scanner positions are in world space. Of LAS files, coordinates that Blender has rounded only are those of the file
+    again. `single` of the table says whether single precision resolves the coordinates; notices name the columns in
+    doubt.
     """
     matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
     seen = seen_positions(context, obj)

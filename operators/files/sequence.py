@@ -25,28 +25,12 @@ _INPUTS = (  # of the nodes
 
 
 def add_sequence(context, name: str, frames, numbers):
-    """Add an object that shows other objects one after the other, which move to a collection of their own.
+    """Return a new object that shows other objects one after the other, which move to a collection of their own.
 
     Nodes choose by the frame of the scene, so that renders, undo and saved files need no handler. They use the objects
     of the collection in natural order of their names; the points of the object, one for each, have their first frames.
-
-    Parameters
-    ----------
-    context : bpy.types.Context
-    name : str
-    frames : sequence of bpy.types.Object
-        In the active collection.
-    numbers : sequence of int
-        Ascending: the frames of the scene from which on each is shown.
-
-    Returns
-    -------
-    bpy.types.Object
-
-    Raises
-    ------
-    PointCloudError
-        A number is beyond the last frame that Blender has.
+    The numbers, ascending, are the frames of the scene from which on each is shown; one beyond the last frame that
+    Blender has raises `PointCloudError`.
     """
     first, last = numbers[0], numbers[-1]
     if last > _LAST:

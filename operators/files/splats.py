@@ -47,23 +47,11 @@ _UPRIGHT = {
 
 
 def add_splats(name, splats, collection, known=None, up="Z"):
-    """Add an object of splats as loose vertices, which become a point cloud by `mark` and Object > Convert.
+    """Add an object of splats as loose vertices, which become a point cloud by `mark` and Object > Convert; return it.
 
-    Coordinates are those of the file, less an offset if they are far from the origin; the object is rotated instead.
-
-    Parameters
-    ----------
-    name : str
-    splats : Splats
-    collection : bpy.types.Collection
-    known : ndarray, (3,), optional
-        The offset of other objects, shared if the splats are near enough.
-    up : {"Z", "Y", "-Y"}
-        Axis of the file that points upwards.
-
-    Returns
-    -------
-    bpy.types.Object
+    Coordinates are those of the file, less an offset if they are far from the origin: `known`, that of other objects,
+    if they are near enough. The object is rotated instead, by the axis of the file that points upwards: "Z", "Y" or
+    "-Y".
     """
     mesh = bpy.data.meshes.new(name)
     mesh.vertices.add(len(splats))
@@ -94,12 +82,7 @@ def _write(obj, splats):
 def splats_of_columns(obj):
     """Return the splats whose columns in a file the points of an object have as attributes; see `holds_columns`.
 
-    Returns
-    -------
-    Splats
-        With notices of what was guessed or left out.
-    ndarray, (n,) bool
-        Which points they are: those of finite numbers.
+    Notices tell what was guessed or left out. Return also which points they are, (n,) bool: those of finite numbers.
     """
     data = obj.data
     columns = dict(zip("xyz", own_positions(data).T, strict=True))

@@ -169,14 +169,7 @@ def _name_of(paths):
 
 
 def _read(paths, wanted, name, progress):
-    """Read the wanted points of files.
-
-    Returns
-    -------
-    PointTable
-    int
-        How many points the files have.
-    """
+    """Read the wanted points of files as a table; return also how many points the files have."""
     states = [(str(path), path.stat().st_mtime_ns, path.stat().st_size) for path in paths if os.path.isfile(path)]
     box = () if wanted.box is None else wanted.box
     key = cache.content("tiles", *map(tuple, states), *wanted._replace(box=None), *box)

@@ -138,15 +138,9 @@ def tag_changed(data):
 
 
 def write_attribute(data, name: str, values, data_type: str = ""):
-    """Write one value per point of a mesh or a point cloud, replacing an attribute of that name.
+    """Write values, (n,) or (n, k), to the points of a mesh or a point cloud, replacing an attribute of that name.
 
-    Parameters
-    ----------
-    data : bpy.types.Mesh or bpy.types.PointCloud
-    name : str
-    values : array_like, (n,), (n, 2), (n, 3) or (n, 4)
-    data_type : str
-        As Blender names it; empty for that of our own results.
+    The type is one that Blender names; empty for that of our own results.
     """
     if not data_type:
         data_type = type_of(name)

@@ -35,10 +35,7 @@ class Box(NamedTuple):
 def box_of(context, name, offset) -> Box:
     """Return the box of an object, shifted by an offset, (3,), from world coordinates to others.
 
-    Raises
-    ------
-    PointCloudError
-        There is no such object, or it has no volume.
+    If there is no such object, or it has no volume, `PointCloudError` is raised.
     """
     context.view_layer.update()  # a script may just have moved it
     obj = bpy.data.objects.get(name)

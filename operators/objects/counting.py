@@ -118,17 +118,10 @@ def members(obj, name: str, glance=False, trusting=False) -> Members | None:
 
 
 def all_members(obj, names, glance=False, trusting=False) -> list:
-    """Summarize several groups, `Members` each.
+    """Summarize several groups, `Members` each; a missing one has no points.
 
-    Parameters
-    ----------
-    obj : bpy.types.Object
-    names : sequence of str
-        The groups; a missing one has no points.
-    glance : bool
-        Be quick: a change may be missed for some seconds, and a group is None until its first count.
-    trusting : bool
-        Be quicker: take the last count, however old, unless undo or this extension changed the group.
+    At a glance it is quick: a change may be missed for some seconds, and a group is None until its first count. If
+    trusting it is quicker: the last count is taken, however old, unless undo or this extension changed the group.
     """
     there = [name for name in names if has_group(obj, name)]
     if obj.type != "MESH":

@@ -8,20 +8,10 @@ from .place import OFFSET, link_beside
 
 
 def add_curves(obj, name, lines, thickness=0.0):
-    """Add a curve object beside an object, with the same place.
+    """Add a curve object beside an object, with the same place, and return it.
 
-    Parameters
-    ----------
-    obj : bpy.types.Object
-    name : str
-    lines : iterable of ((k, 3) ndarray, bool)
-        Corners in the object's local space, and whether the last one is joined to the first.
-    thickness : float
-        Radius of tubes along the lines.
-
-    Returns
-    -------
-    bpy.types.Object
+    Lines are corners in the object's local space, (k, 3), each with whether its last one is joined to the first; the
+    thickness is the radius of tubes along them.
     """
     made = bpy.data.objects.new(name, _curve(name, lines, thickness))
     link_beside(made, obj)
@@ -32,18 +22,9 @@ def add_curves(obj, name, lines, thickness=0.0):
 
 
 def plot(obj, name, across, values):
-    """Add a curve object beside an object, upright in the world: numbers along X, values along Z, from zero.
+    """Add a curve object beside an object, upright in the world: numbers along X, values along Z, from zero; return it.
 
-    Parameters
-    ----------
-    obj : bpy.types.Object
-    name : str
-    across, values : ndarray, (k,)
-        Where a value is not finite, there is a gap.
-
-    Returns
-    -------
-    bpy.types.Object
+    Where a value is not finite, there is a gap.
     """
     known = np.isfinite(values)
     places = np.column_stack([across, values, np.zeros(len(values))])

@@ -60,28 +60,10 @@ def is_chosen(obj, name: str, default: str) -> bool:
 
 
 def chosen_weights(obj, name: str, setting: str, least: int = 1, outside=0.0):
-    """Read the weights in the group that a setting names.
+    """Read the weights in the group that a setting names, (n,) float64, with a value of the points outside.
 
-    Parameters
-    ----------
-    obj : bpy.types.Object
-    name : str
-        The group.
-    setting : str
-        Label of the setting, for errors.
-    least : int
-        Required number of points with a weight above zero.
-    outside : float
-        Value of the points outside the group.
-
-    Returns
-    -------
-    ndarray, (n,) float64
-
-    Raises
-    ------
-    PointCloudError
-        The group does not exist, or has too few points.
+    A group that does not exist, or has fewer points with a weight above zero than required, raises `PointCloudError`,
+    with the label of the setting.
     """
     kind = group_kind(obj)
     if not has_group(obj, name):
@@ -140,19 +122,9 @@ def check_assignable(obj, name: str, must_exist: bool):
 
 
 def assign(obj, name: str, chosen, action: str, weight: float):
-    """Change a group, or add it.
+    """Change a group, see `check_assignable`, or add it: give the chosen points, (n,) bool, a weight in it.
 
-    Parameters
-    ----------
-    obj : bpy.types.Object
-    name : str
-        The group; see `check_assignable`.
-    chosen : ndarray, (n,) bool
-        The points.
-    action : {"REPLACE", "ADD", "REMOVE"}
-        Whether they replace the points of the group, are added to them, or removed.
-    weight : float
-        Of the points in the group.
+    They replace the points of the group, are added to them, or removed, by the action: "REPLACE", "ADD" or "REMOVE".
     """
     if obj.type == "MESH":
         group = obj.vertex_groups.get(name) or obj.vertex_groups.new(name=name)

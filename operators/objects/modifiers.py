@@ -61,18 +61,10 @@ def _inputs(group):
 
 
 def new_group(name: str, tag: str, inputs=()):
-    """Add an empty node group for a modifier, marked as ours, with geometry going in and out.
+    """Add an empty node group for a modifier, marked as ours, with geometry going in and out, and return it.
 
-    Parameters
-    ----------
-    name, tag : str
-    inputs : sequence of tuple
-        Of each other input its name, by which it is found again should somebody rename it, its kind, its tooltip, and
-        where it differs from other inputs a dict of properties of its socket.
-
-    Returns
-    -------
-    bpy.types.GeometryNodeTree
+    Of each other input `inputs` has its name, by which it is found again should somebody rename it, its kind, its
+    tooltip, and where it differs from other inputs a dict of properties of its socket.
     """
     group = bpy.data.node_groups.new(name, "GeometryNodeTree")
     group[tag] = True
@@ -128,10 +120,7 @@ def _write(data, path, value):
 def input_property(modifier, name: str):
     """Return data and property path of an input of a modifier of ours, as panels draw them.
 
-    Raises
-    ------
-    PointCloudError
-        Somebody has removed it.
+    If somebody has removed it, `PointCloudError` is raised.
     """
     group = modifier.node_group
     named = _inputs(group)

@@ -20,14 +20,9 @@ _open = {}  # frames by path and time of change: memory maps of files
 
 
 def write_frames(path: Path, count: int, points: int, rows):
-    """Write frames to a file, one after the other; after a failure there is none.
+    """Write so many frames of so many points to a file, one after the other; after a failure there is none.
 
-    Parameters
-    ----------
-    path : Path
-    count, points : int
-    rows : iterable of ndarray, (points,)
-        At least as many as the count.
+    Rows, (points,), are at least as many as that.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     header = {"descr": _DTYPE.str, "fortran_order": False, "shape": (count, points)}
@@ -44,10 +39,7 @@ def write_frames(path: Path, count: int, points: int, rows):
 def frame_of(obj, frame: float):
     """Return the values of an object's motion at a frame of the scene, (n,) float32, between those on disk.
 
-    Raises
-    ------
-    PointCloudError
-        The file is missing, or does not fit the points.
+    A file that is missing, or does not fit the points, raises `PointCloudError`.
     """
     settings = obj.meshfree
     frames = _frames(bpy.path.abspath(settings.motion_file), obj)

@@ -72,14 +72,9 @@ def size_of(paths) -> int:
 
 
 def shrink_former(most: float) -> int:
-    """Remove former files, the oldest first, until the others take so many bytes at most.
+    """Remove former files, the oldest first, until the others take so many bytes at most; return how many were removed.
 
     Those stay that a .blend file plays as it was saved.
-
-    Returns
-    -------
-    int
-        How many were removed.
     """
     kept = _all_saved()
     removed, left = 0, former()

@@ -27,17 +27,8 @@ def mode_name(number: int) -> str:
 def show_motion(obj, height: float, normals, formula, first: int, frames: int):
     """Give an object the modifier that its motion needs, or take it away if it needs none.
 
-    Parameters
-    ----------
-    obj : bpy.types.Object
-    height : float
-        Displacement where the motion is 1, in lengths of the world; 0 for none.
-    normals : ndarray, (n, 3)
-        In local space.
-    formula : Formula or None
-        Of the motion; none where its attribute holds the frame on show.
-    first, frames : int
-        Of the scene.
+    The height is the displacement where the motion is 1, in lengths of the world, 0 for none, along normals, (n, 3), in
+    local space. There is no formula of a motion whose attribute holds the frame on show. Frames are those of the scene.
     """
     modifier = next((item for item in obj.modifiers if is_motion(item)), None)
     remove_numbered(obj.data, MOTION_MODE, 0 if formula is None else len(formula.rates))

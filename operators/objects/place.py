@@ -56,10 +56,7 @@ def check_movable(obj):
 def move_object(obj, matrix):
     """Give an object another matrix in world space; parents and delta transforms stay as they are.
 
-    Raises
-    ------
-    PointCloudError
-        Its channels cannot express it, where its parent is scaled unevenly.
+    If its channels cannot express it, where its parent is scaled unevenly, `PointCloudError` is raised.
     """
     parent = np.array(obj.matrix_world) @ np.linalg.inv(obj.matrix_basis)
     obj.matrix_world = matrix

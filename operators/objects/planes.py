@@ -16,10 +16,7 @@ def object_of(scene, name, meant):
 def plane_of(scene, name, obj):
     """Return the local XY plane of an object of a scene: a point, from the location of another one on, and a normal.
 
-    Raises
-    ------
-    PointCloudError
-        There is no such object, or it has no plane.
+    If there is no such object, or it has no plane, `PointCloudError` is raised.
     """
     found = object_of(scene, name, "whose local XY plane is meant, such as an empty")
     matrix = np.array(found.matrix_world, dtype=np.float64)

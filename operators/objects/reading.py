@@ -135,10 +135,7 @@ def _units(vectors):
 def read_points(context, obj) -> Reading:
     """Read an object's points as displayed, after modifiers only if the settings ask for them.
 
-    Raises
-    ------
-    PointCloudError
-        The points cannot be read or used; the text says what to do.
+    Points that cannot be read or used raise `PointCloudError`, whose text says what to do.
     """
     positions, matrix = seen_positions(context, obj), checked_matrix(obj)
     judged = obj.meshfree.leave_out_floaters and has_splats(obj.data)

@@ -23,17 +23,10 @@ _DIGITS = 3  # that scans justify
 
 
 def check_writable(obj, names, make_single_user: bool, among=()):
-    """Refuse an object that results cannot be written to, before anything is computed.
+    """Refuse an object to which attributes of these names cannot be written, before anything is computed.
 
-    Parameters
-    ----------
-    obj : bpy.types.Object
-    names : iterable of str
-        Attributes to be written.
-    make_single_user : bool
-        Whether the object gets a mesh of its own.
-    among : sequence of bpy.types.Object
-        Objects that may share the mesh, since they are processed too: of the same scale, or to get their own mesh.
+    It may get a mesh of its own. Objects that share the mesh may be `among` those that are processed too: of the same
+    scale, or to get their own mesh.
     """
     others = [
         other.name

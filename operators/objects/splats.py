@@ -69,10 +69,7 @@ def harmonic_names(data) -> list:
 def read_splats(data, with_harmonics=True) -> "core.splats.Splats":
     """Read the splats of a mesh or a point cloud, in local space, without harmonics as if they were of degree 0.
 
-    Raises
-    ------
-    PointCloudError
-        Its points are no splats.
+    Points that are no splats raise `PointCloudError`.
     """
     if not has_splats(data):
         raise PointCloudError(

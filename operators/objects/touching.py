@@ -7,27 +7,10 @@ from ...core import PointCloudError
 
 
 def places_of(context, obj, name: str, frames) -> list:
-    """Return where the vertices of another object are at frames of the scene, or its place if it has none.
+    """Return where the vertices of another object are at frames of the scene, (k, 3) each, or its place if it has none.
 
-    Parameters
-    ----------
-    context : bpy.types.Context
-        Its scene is put back to the frame on show.
-    obj : bpy.types.Object
-        The object with the points.
-    name : str
-        Of the other object.
-    frames : iterable of int
-
-    Returns
-    -------
-    list of ndarray, (k, 3)
-        Beside the points of the object as they are read at the frame on show, wherever it moves.
-
-    Raises
-    ------
-    PointCloudError
-        There is no such object in the scene, or it is the same.
+    They are beside the points of the object as these are read at the frame on show, to which the scene is put back,
+    wherever it moves. If there is no other object of that name, `PointCloudError` is raised.
     """
     scene, other = context.scene, context.scene.objects.get(name)
     if other is None or other == obj:

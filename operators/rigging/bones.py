@@ -23,13 +23,7 @@ class Bones(NamedTuple):
 
 
 def deforming_bones(armature) -> Bones:
-    """Read the bones of an armature object that deform, in their order.
-
-    Raises
-    ------
-    PointCloudError
-        It has none.
-    """
+    """Read the bones of an armature object that deform, in their order; if it has none, raise `PointCloudError`."""
     bones = [bone for bone in armature.data.bones if bone.use_deform]
     if not bones:
         raise PointCloudError(
@@ -62,12 +56,8 @@ def followed_armature(obj):
 def ends_seen_from(obj, armature, bones):
     """Return heads and tails of bones in the space in which the points of an object are read, (b, 3) each.
 
-    That is world space, moved by the object's location; see `Reading`.
-
-    Raises
-    ------
-    PointCloudError
-        The armature is scaled to nothing along an axis.
+    That is world space, moved by the object's location; see `Reading`. An armature that is scaled to nothing along an
+    axis raises `PointCloudError`.
     """
     matrix = np.array(armature.matrix_world)
     if not np.linalg.cond(matrix[:3, :3]) < 1e6:

@@ -150,12 +150,8 @@ class Bound(NamedTuple):
 def bind(obj, armature) -> list:
     """Let the points of an object follow the bones of an armature by its weights; return notices.
 
-    Meshes without splats keep Blender's Armature modifier for their points; their discs are turned.
-
-    Raises
-    ------
-    PointCloudError
-        It follows handles, or has no weights of these bones.
+    Meshes without splats keep Blender's Armature modifier for their points; their discs are turned. An object that
+    follows handles, or has no weights of these bones, raises `PointCloudError`.
     """
     return write_bound(obj, armature, plan_bound(bpy.context, obj, armature))
 

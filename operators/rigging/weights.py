@@ -50,10 +50,7 @@ def read_weights(obj):
 def weight_table(obj):
     """Return of each point the numbers of its bones by `weight_names`, (n, k) int, and their weights, (n, k) float64.
 
-    Raises
-    ------
-    PointCloudError
-        A point cloud without weights, or with numbers of bones that there are not.
+    A point cloud without weights, or with numbers of bones that there are not, raises `PointCloudError`.
     """
     if takes_groups(obj):
         return _groups_table(obj)
@@ -84,15 +81,10 @@ def _groups_table(obj):
 
 
 def write_weights(obj, names, weights):
-    """Write the weights of all points, replacing those of the same names and, of a point cloud, all others.
+    """Write the weights of all points, (n, b), replacing those of the same names and, of a point cloud, all others.
 
-    Parameters
-    ----------
-    obj : bpy.types.Object
-    names : sequence of str, (b,)
-        Vertex groups of other names are left as they are, and those of these names stay in their places.
-    weights : ndarray, (n, b)
-        From 0 to 1. A point cloud keeps the `MOST` largest of each point, with the same sum.
+    Vertex groups of other names are left as they are, and those of these names stay in their places. Of weights from 0
+    to 1 a point cloud keeps the `MOST` largest of each point, with the same sum.
     """
     if takes_groups(obj):
         for name, column in zip(names, weights.T, strict=True):

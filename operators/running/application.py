@@ -163,21 +163,10 @@ def compute_all(plans, progress):
 
 
 def chosen_objects(context, becomes_single):
-    """Choose among the active object and the other selected ones.
+    """Choose among the active object and the other selected ones all that can be read and written.
 
-    Parameters
-    ----------
-    context : bpy.types.Context
-    becomes_single : callable
-        Whether an object is to get a mesh of its own.
-
-    Returns
-    -------
-    list of bpy.types.Object
-        All meshes and point clouds that can be read and written; one of those that share a mesh, but each that is to
-        get its own.
-    list of str
-        Why others were left out.
+    Of those that share a mesh one is chosen, but each that becomes single, as the function tells. Return them, and why
+    others were left out.
     """
     chosen, left_out = {}, []
     for obj in [context.object, *context.selected_objects]:

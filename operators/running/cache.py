@@ -19,20 +19,10 @@ _lock = Lock()  # computations run in threads
 
 
 def build(points, options, boundary, progress, orientation=None, splats=None) -> Built:
-    """Return the operator of these points, options and boundary, built only if it is not kept.
+    """Return the operator of points, (n, 3), options and boundary, built only if it is not kept.
 
-    Parameters
-    ----------
-    points : ndarray, (n, 3)
-    options : LaplacianOptions or PaperOptions
-    boundary : ndarray, (n,) bool, or None
-        The boundary points; None leaves it to the options.
-    progress : callable
-        Called as ``progress(stage, fraction)``.
-    orientation : ndarray, (n, 3), or None
-        Vectors that orient the normals; None leaves it to core. The operator itself is not rebuilt for others.
-    splats : Splats or None
-        The splats of the points: `floating` ones are left out.
+    Boundary points are (n,) bool; None leaves them to the options. The orientation, (n, 3), orients the normals; None
+    leaves that to core. The operator itself is not rebuilt for another. Of splats, `floating` ones are left out.
     """
 
     def compute():

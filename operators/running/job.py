@@ -63,10 +63,7 @@ class Snapshot:
     def find_same(self, context, modes):
         """Return the object.
 
-        Raises
-        ------
-        PointCloudError
-            It was removed or changed, or cannot be written to in its present mode.
+        If it was removed or changed, or cannot be written to in its present mode, `PointCloudError` is raised.
         """
         obj = self.find()
         if obj is None:

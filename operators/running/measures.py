@@ -53,16 +53,10 @@ class Measured(NamedTuple):
 
 
 def measure(points, options, boundary, budget, modes, progress, orientation=None, splats=None) -> Measured:
-    """Measure the surface at each point.
+    """Measure the surface at each point; see `cache.build` for most arguments.
 
-    Parameters
-    ----------
-    points, options, boundary, progress, orientation, splats
-        See `cache.build`.
-    budget : int or None
-        How many points to build the operator on at most; 0 for as many as fit the memory, None for all.
-    modes : int
-        How many modes will be computed.
+    The operator is built on as many points as the budget says at most; on as many as fit the memory for 0, on all for
+    None. `modes` is how many will be computed.
     """
     out = cache.floating(splats)
     subset = _subset(points, options, boundary, splats, budget, modes, progress)

@@ -108,10 +108,7 @@ def check_convertible(obj):
 def _convert(context, obj, target):
     """Convert an object by Blender's operator, which converts selected ones, and keep what that loses.
 
-    Returns
-    -------
-    str
-        Which points these are, if nodes generated them.
+    Return a text on which points these are, if nodes generated them.
     """
     groups = {name: group_weights(obj, name) for name in _group_names(obj)}
     chosen, count = selection(obj), point_count(obj.data)
