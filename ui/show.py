@@ -315,11 +315,9 @@ def _follow_points(obj):
     """Let a display follow points that were moved, added or deleted, in whatever way: their size, and their discs."""
     if find_display(obj) is None or find_deform(obj) is not None or obj.mode != "OBJECT" or not obj.is_editable:
         return
-    if obj.data.is_editable and obj.meshfree.spacing_of != points_checksum(obj.data):
-        if _sized_by_hand(obj):
-            _measure(obj)
-        else:
-            resize(obj)
+    by_hand = _sized_by_hand(obj)
+    if obj.data.is_editable and _measure(obj) and not by_hand:
+        _scale(obj)
 
 
 def show_splats(obj):
@@ -407,25 +405,31 @@ def _leave_preview():
 
 def resize(obj):
     """Set the size of the points by the settings, in units of their spacing."""
-    modifier = find_display(obj)
-    if modifier is None:
-        return
-    _measure(obj)
-    set_input(modifier, "Radius", _radius(obj.meshfree))
+    if find_display(obj) is not None:
+        _measure(obj)
+        _scale(obj)
+
+
+def _scale(obj):
+    """Set the size by a spacing that is known."""
+    set_input(find_display(obj), "Radius", _radius(obj.meshfree))
     reshape(obj)
 
 
-def _measure(obj):
-    """Measure the spacing of the points, and find their discs again, if they have changed."""
+def _measure(obj) -> bool:
+    """Measure the spacing of the points, and find their discs again, if they have changed; return whether they have."""
     kept = obj.meshfree
-    if obj.mode != "EDIT":
-        points = points_checksum(obj.data)
-        if kept.spacing_of != points:
-            kept.discs_of = kept.discs_of or kept.spacing_of  # which earlier versions did not know
-            kept.spacing_of, kept.spacing = points, spacing(obj.data)
-            renew_discs(obj)
-    elif not kept.spacing:
-        kept.spacing = core.geometry.typical_distance(positions_now(obj))
+    if obj.mode == "EDIT":
+        if not kept.spacing:
+            kept.spacing = core.geometry.typical_distance(positions_now(obj))
+        return False
+    points = points_checksum(obj.data)
+    changed = kept.spacing_of != points
+    if changed:
+        kept.discs_of = kept.discs_of or kept.spacing_of  # which earlier versions did not know
+        kept.spacing_of, kept.spacing = points, spacing(obj.data)
+        renew_discs(obj, points)
+    return changed
 
 
 def reshape(obj):

@@ -68,13 +68,9 @@ def discs_at_rest(obj):
 def write_discs(obj, values):
     """Write the discs of an object's points where they are now, (n, 3), as `DISC` holds them."""
     write_attribute(obj.data, DISC, values)
+    points = points_checksum(obj.data)
     for owner in (obj, *sharing_objects(obj)):
-        owner.meshfree.discs_of = points_checksum(obj.data)
-
-
-def are_discs_stale(obj) -> bool:
-    """Whether points were moved, added or deleted since their discs were found, as far as that is known."""
-    return DISC in obj.data.attributes and obj.meshfree.discs_of not in ("", points_checksum(obj.data))
+        owner.meshfree.discs_of = points
 
 
 def local_gradients(gradients, matrix):

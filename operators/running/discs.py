@@ -15,7 +15,7 @@ from ..objects.attributes import (
     read_attribute,
     remove_attributes,
 )
-from ..objects.carried import are_discs_stale, discs_at_rest, write_discs
+from ..objects.carried import discs_at_rest, write_discs
 from ..objects.handlers import add_handlers, notify, remove_handlers
 from ..objects.reading import discs, find_object
 from . import cache
@@ -62,16 +62,16 @@ def _found(local, sides, progress=None):
     return discs(core.geometry.toward(found.normals, sides), found.radii, local)
 
 
-def renew_discs(obj):
-    """Find the discs of an object's display again if its points were moved, added or deleted; of many in a thread.
+def renew_discs(obj, points):
+    """Find the discs of an object's display again if they are of other points than the checksum; of many in a thread.
 
     Sides stay. Where points have no tangent planes any more they become dots.
     """
-    if not are_discs_stale(obj):
-        return
     data = obj.data
+    if DISC not in data.attributes or obj.meshfree.discs_of in ("", points):  # empty where it is not known
+        return
     local, sides = own_positions(data).astype(np.float64), read_attribute(data, DISC).astype(np.float64)
-    work = _Work(points_checksum(data), Job("Discs", [], lambda progress: _found(local, sides, progress)))
+    work = _Work(points, Job("Discs", [], lambda progress: _found(local, sides, progress)))
     if bpy.app.background or len(local) <= _AT_ONCE:
         work.job.wait(None)
         _take(obj, work)
