@@ -5,8 +5,8 @@ from scipy.sparse.linalg import eigsh
 
 import core
 from core.geometry.cloud import read_cloud
-from core.paper.operator import unsymmetrized_operator
 
+from .paper.unsymmetrized import unsymmetrized_operator
 from .samplings import (
     fibonacci_sphere,
     icosahedral_sphere,

@@ -5,6 +5,5 @@ from .areas import regularized_areas as regularized_areas
 from .normals import covariance_normals as covariance_normals
 from .operator import build_laplacian as build_laplacian
 from .operator import projected_distance as projected_distance
-from .operator import unsymmetrized_operator as unsymmetrized_operator
 from .stability import Stability as Stability
 from .stability import check_stability as check_stability

@@ -5,13 +5,13 @@ import pytest
 
 import core
 from benchmarks.paper.descent import algorithm_1
+from benchmarks.paper.unsymmetrized import unsymmetrized_operator
 from benchmarks.samplings import fibonacci_sphere, random_sphere, uneven_sphere
 from core.geometry.boundary import no_boundary
 from core.geometry.cloud import read_cloud
 from core.operator.areas import KernelMatrix
 from core.options import LaplacianOptions, PaperOptions
 from core.paper.areas import TAU, constrained_areas, regularized_areas
-from core.paper.operator import unsymmetrized_operator
 
 
 @pytest.fixture(scope="module")
