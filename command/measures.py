@@ -22,24 +22,15 @@ _TOLD = 5  # notices of volumes over a plane that are told
 
 
 class Base(NamedTuple):
-    """What volumes are measured over: a plane, or along its normal the surface of another cloud.
+    """What volumes are measured over: a plane, or along its normal the surface of another cloud."""
 
-    Attributes
-    ----------
-    point, normal : ndarray, (3,)
-    ground : callable or None
-        Function of a progress callback that returns the operator of the other cloud.
-    shift : ndarray, (3,)
-        From the coordinates of the points to those of the other cloud.
-    name : str
-        Of the other cloud.
-    """
-
+    # (3,) each
     point: Array
     normal: Array
+    # Function of a progress callback that returns the operator of the other cloud
     ground: Callable[[Progress], core.LaplaceBeltrami] | None = None
-    shift: Array = np.zeros(3)
-    name: str = ""
+    shift: Array = np.zeros(3)  # (3,), from the coordinates of the points to those of the other cloud
+    name: str = ""  # of the other cloud
 
 
 def pile_over(

@@ -58,23 +58,12 @@ ATTRIBUTES = tools.settings.by_name(
 
 
 class Match(NamedTuple):
-    """Where points lie on the surface of sources.
+    """Where points lie on the surface of sources."""
 
-    Attributes
-    ----------
-    laplacian : LaplaceBeltrami
-        Of the points.
-    places : SurfaceMatch
-    state : ndarray, (n,) int
-        The number of a name of the result `quantities.TRANSFER`.
-    notices : list of str
-        About surfaces whose sheets are hardly told apart.
-    """
-
-    laplacian: core.LaplaceBeltrami
+    laplacian: core.LaplaceBeltrami  # of the points
     places: core.rig.SurfaceMatch
-    state: np.ndarray
-    notices: list[str]
+    state: np.ndarray  # (n,) int, the number of a name of the result `quantities.TRANSFER`
+    notices: list[str]  # about surfaces whose sheets are hardly told apart
 
     def share(self, state: int) -> float:
         """Return the share of the points in a state."""

@@ -12,24 +12,13 @@ from .tool import Array, Cloud, Length, Outcome, PointTool, Progress, Row
 
 
 class Compared(NamedTuple):
-    """What a comparison found.
+    """What a comparison found."""
 
-    Attributes
-    ----------
-    found : Deviation
-        Of points that the analysis leaves out nothing is known along normals: they have none.
-    aligned : Alignment or None
-        How the points were moved, if they were.
-    other : str
-        The name of the other cloud.
-    notices : list of str
-        Of both analyses, and of what is in doubt or not compared.
-    """
-
+    # Of points that the analysis leaves out nothing is known along normals: they have none
     found: "core.measure.Deviation"
-    aligned: "core.measure.Alignment | None"
-    other: str
-    notices: list[str]
+    aligned: "core.measure.Alignment | None"  # how the points were moved, if they were
+    other: str  # the name of the other cloud
+    notices: list[str]  # of both analyses, and of what is in doubt or not compared
 
 
 class Compare(PointTool):

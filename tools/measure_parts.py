@@ -13,27 +13,18 @@ from .tool import Array, Cloud, Laplacian, Length, Outcome, Progress, Row, Tool
 
 
 class PartRow(NamedTuple):
-    """Measures of a part, in world lengths; NaN for what there is not.
+    """Measures of a part, in world lengths; NaN for what there is not."""
 
-    Attributes
-    ----------
-    name : str
-        Such as "Component 0".
-    points : int
-    area, boundary_length, volume : float
-        With their uncertainties; volumes only of closed components.
-    mean, root_mean_square : float
-        Of an attribute, by area.
-    """
-
-    name: str
+    name: str  # such as "Component 0"
     points: int
+    # With their uncertainties; volumes only of closed components
     area: float
     area_uncertainty: float
     boundary_length: float
     length_uncertainty: float
     volume: float = nan
     volume_uncertainty: float = nan
+    # Of an attribute, by area
     mean: float = nan
     root_mean_square: float = nan
 

@@ -13,19 +13,11 @@ GAP = 12  # edges around a hole that counts as a gap between points, and is clos
 
 
 class Closed(NamedTuple):
-    """A mesh without its small holes.
-
-    Attributes
-    ----------
-    mesh : SurfaceMesh
-    faces : list of ndarray, (m, k) int
-    opened : int
-        How many edges of one face are left.
-    """
+    """A mesh without its small holes."""
 
     mesh: "core.surface.SurfaceMesh"
-    faces: list[Array]
-    opened: int
+    faces: list[Array]  # (m, k) int each
+    opened: int  # how many edges of one face are left
 
 
 class MeshSurface(Tool):

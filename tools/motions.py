@@ -26,23 +26,13 @@ class Formula(NamedTuple):
     """A motion as a sum of modes, with the time from 0 at the first frame of the scene to 1 at the last.
 
     Each start adds to the amplitude of a mode its share times a function of the time since then.
-
-    Attributes
-    ----------
-    function : {"COSINE", "EXPONENT"}
-        Of nodes: ``cos(rate * time)``, or ``exp(rate * time)``.
-    rates : ndarray, (k,)
-    modes : ndarray, (n, k)
-    starts : ndarray, (j,)
-        Times, ascending.
-    shares : ndarray, (j, k)
     """
 
-    function: str
-    rates: Array
-    modes: Array
-    starts: Array
-    shares: Array
+    function: str  # "COSINE" or "EXPONENT", of nodes: ``cos(rate * time)``, or ``exp(rate * time)``
+    rates: Array  # (k,)
+    modes: Array  # (n, k)
+    starts: Array  # (j,), times, ascending
+    shares: Array  # (j, k)
 
     @property
     def is_single(self) -> bool:
@@ -62,28 +52,17 @@ class Formula(NamedTuple):
 
 
 class Chosen(NamedTuple):
-    """The settings of a motion, with zero for automatic lengths.
+    """The settings of a motion, with zero for automatic lengths."""
 
-    Attributes
-    ----------
-    kind : {"HEAT", "WAVE", "REACTION", "FRONT"}
-    sources : ndarray, (n,) bool
-        Where it begins; where it ever does, if something touches the points.
-    frames, step : int
-        Frames of the scene, and how many are from one that is kept to the next.
-    distance, width : float
-    pattern : {"spots", "stripes"}
-    touched : list of ndarray (k,) int, or None
-        The points there, for each frame that is kept: also those touched since the one before.
-    """
-
-    kind: str
-    sources: Array
+    kind: str  # "HEAT", "WAVE", "REACTION", "FRONT"
+    sources: Array  # (n,) bool, where it begins; where it ever does, if something touches the points
+    # Frames of the scene, and how many are from one that is kept to the next
     frames: int
     step: int
     distance: float
     width: float
-    pattern: str
+    pattern: str  # "spots" or "stripes"
+    # (k,) int each, the points there, for each frame that is kept: also those touched since the one before
     touched: list[Array] | None = None
 
     @property
@@ -104,27 +83,15 @@ class Chosen(NamedTuple):
 
 
 class InModes(NamedTuple):
-    """A motion as modes.
-
-    Attributes
-    ----------
-    formula : Formula
-    low, high : float
-        Range of its values; without a touching object that of the first frame.
-    last : float
-        The largest size on show in the end, about: waves are lower once they have left their pulse.
-    held : float
-        Share of the pulses that the modes hold.
-    distance : float
-        How far it went.
-    """
+    """A motion as modes."""
 
     formula: Formula
+    # Range of its values; without a touching object that of the first frame
     low: float
     high: float
-    last: float
-    held: float
-    distance: float
+    last: float  # the largest size on show in the end, about: waves are lower once they have left their pulse
+    held: float  # share of the pulses that the modes hold
+    distance: float  # how far it went
 
 
 def find_touched(laplacian: Laplacian, chosen: Chosen, places: list[Array], length: Length) -> Chosen:

@@ -14,26 +14,15 @@ _AXES = "XYZ"
 
 
 class Measured(NamedTuple):
-    """A profile.
+    """A profile."""
 
-    Attributes
-    ----------
-    distance, values, off : ndarray, (k,)
-        Along the path, the height or attribute, and its uncertainty.
-    columns : list of ndarray, (k,)
-        Of the table.
-    ends : ndarray, (2, 3)
-        The points that the path is between, in the coordinates of the file.
-    away : list of float
-        How far they are from where they were wanted.
-    """
-
+    # (k,), along the path, the height or attribute, and its uncertainty
     distance: Array
     values: Array
     off: Array
-    columns: list[Array]
-    ends: Array
-    away: list[float]
+    columns: list[Array]  # (k,) each, of the table
+    ends: Array  # (2, 3), the points that the path is between, in the coordinates of the file
+    away: list[float]  # how far they are from where they were wanted
 
     def table(self, source: str) -> str:
         """Return a table as text with commas: of heights alone, or with an attribute."""

@@ -78,19 +78,12 @@ _shaders = []
 
 
 class Look(NamedTuple):
-    """How the points of an object in Edit Mode look.
+    """How the points of an object in Edit Mode look."""
 
-    Attributes
-    ----------
-    places, discs : ndarray, (n, 3) float32
-        In local space; discs as in the attribute, zero where they are not known.
-    colors : ndarray, (n, 4) float32
-        Linear; alpha 0 hides a point.
-    """
-
+    # (n, 3) float32, in local space; discs as in the attribute, zero where they are not known
     places: np.ndarray
     discs: np.ndarray
-    colors: np.ndarray
+    colors: np.ndarray  # (n, 4) float32, linear; alpha 0 hides a point
 
 
 @dataclass

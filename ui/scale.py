@@ -29,32 +29,15 @@ _MOST_BOXES = 12
 
 
 class Scale(NamedTuple):
-    """The colours of an attribute and their values.
-
-    Attributes
-    ----------
-    title : str
-    unit : str
-        Empty for plain numbers.
-    factor : float
-        Conversion of values to that unit.
-    bounds : tuple of float, or None
-        Range of the values; None where directions are shown.
-    colors : list
-        Linear (r, g, b, 1) at even steps from low to high; none where each box has its own.
-    boxes : dict
-        Colours by the names of whole numbers, truth values or directions.
-    ticks : list of (float, str)
-        Round numbers: relative position in the range, and text.
-    """
+    """The colours of an attribute and their values."""
 
     title: str
-    unit: str
-    factor: float
-    bounds: tuple | None
-    colors: list
-    boxes: dict
-    ticks: list
+    unit: str  # empty for plain numbers
+    factor: float  # conversion of values to that unit
+    bounds: tuple | None  # range of the values; None where directions are shown
+    colors: list  # linear (r, g, b, 1) at even steps from low to high; none where each box has its own
+    boxes: dict  # colours by the names of whole numbers, truth values or directions
+    ticks: list  # (float, str), round numbers: relative position in the range, and text
 
     @property
     def full_title(self) -> str:

@@ -22,44 +22,26 @@ _SMOOTHED = 0.3  # relative to the largest eigenvalue: the smoother damps errors
 
 @dataclass
 class Known:
-    """The lowest eigenpairs of one version of the matrix.
+    """The lowest eigenpairs of one version of the matrix."""
 
-    Attributes
-    ----------
-    values : ndarray, (q,)
-    vectors, duals : ndarray, (n, q) float32
-        The eigenvectors, and their products with the mass.
-    """
-
-    values: Floats
+    values: Floats  # (q,)
+    # (n, q) float32, the eigenvectors, and their products with the mass
     vectors: Array
     duals: Array
 
 
 @dataclass
 class Level:
-    """One version of the matrix.
+    """One version of the matrix."""
 
-    Attributes
-    ----------
-    matrix, rough : Rows, (n, n)
-        In double and in single precision.
-    mass : csr_array, (n, n), or None
-        Inner product of its functions; none stands for the identity.
-    top : float
-        Largest eigenvalue, about.
-    steps : list of ndarray, (n, 1) float32
-        Step lengths of the Chebyshev smoother, divided by the diagonal.
-    prolongation, extension, restriction : Rows, (n, m), (n, m) and (m, n)
-        Interpolation from the next level to this one, in double and single precision, and its transpose.
-    known : Known, optional
-    """
-
+    # (n, n), in double and in single precision
     matrix: Rows
     rough: Rows
-    mass: sparse.csr_array | None
-    top: float
-    steps: list[Array]
+    mass: sparse.csr_array | None  # (n, n), inner product of its functions; none stands for the identity
+    top: float  # largest eigenvalue, about
+    steps: list[Array]  # (n, 1) float32 each, step lengths of the Chebyshev smoother, divided by the diagonal
+    # (n, m), (n, m) and (m, n), interpolation from the next level to this one, in double and single precision, and its
+    # transpose
     prolongation: Rows
     extension: Rows
     restriction: Rows

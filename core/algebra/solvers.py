@@ -22,25 +22,13 @@ _PLAIN = 30  # steps before multigrid is set up: enough where fixed points lie e
 
 @dataclass(frozen=True)
 class Iterate:
-    """Where conjugate gradients ended.
+    """Where conjugate gradients ended."""
 
-    Attributes
-    ----------
-    values : ndarray, (m,)
-    products : int
-        Products with the matrix.
-    converged : bool
-        The residual fell to the tolerance.
-    residual : float
-        Its size over that of the load, or of the residual of the first guess where that is larger.
-    definite : bool
-        No direction was found along which the matrix is not positive; with one the values are those before it.
-    """
-
-    values: Array
-    products: int
-    converged: bool
-    residual: float
+    values: Array  # (m,)
+    products: int  # products with the matrix
+    converged: bool  # the residual fell to the tolerance
+    residual: float  # its size over that of the load, or of the residual of the first guess where that is larger
+    # No direction was found along which the matrix is not positive; with one the values are those before it
     definite: bool = True
 
 

@@ -242,30 +242,16 @@ def _notices(reason: str, steps: int, rise: float) -> list[str]:
 
 @dataclass(frozen=True, eq=False)
 class _State:
-    """A surface during the iteration, its operator, and the next step.
+    """A surface during the iteration, its operator, and the next step."""
 
-    Attributes
-    ----------
-    points : ndarray, (n, 3)
-    laplacian : LaplaceBeltrami
-    area : float
-    step : ndarray, (n, 3)
-        To the next surface; zero at fixed points.
-    savings : float
-        Area that Newton's step would save if the area were quadratic; infinite where that step was not found.
-    definite : bool
-        Whether the Jacobi operator is.
-    curved : float
-        Greatest smoothing length times curvature, but for a few points.
-    """
-
-    points: Floats
+    points: Floats  # (n, 3)
     laplacian: LaplaceBeltrami
     area: float
-    step: Floats
+    step: Floats  # (n, 3), to the next surface; zero at fixed points
+    # Area that Newton's step would save if the area were quadratic; infinite where that step was not found
     savings: float
-    definite: bool
-    curved: float
+    definite: bool  # whether the Jacobi operator is
+    curved: float  # greatest smoothing length times curvature, but for a few points
 
     def rises_by_noise(self, before: "_State", epsilon: float) -> bool:
         """Whether Newton's step to it, which was to save less than a share of the area, saved none, nor left less."""

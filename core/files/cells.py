@@ -23,32 +23,15 @@ _COMMENTS = ("#", "//", "%", "!")
 
 @dataclass
 class Rows:
-    """The rows of a file of text.
+    """The rows of a file of text."""
 
-    Attributes
-    ----------
-    blocks : callable
-        Returns an iterator of lists of the lines of the file at each call; see `read_blocks`.
-    path : pathlib.Path
-    first : int
-        How many lines precede the first row.
-    delimiter : str or None
-        None is white space.
-    before : list of str
-        The last lines before the first row that are not empty.
-    sample : list of list of str
-        The words of the first rows.
-    filled : bool
-        Whether cells without a number are read as NaN.
-    """
-
-    blocks: Blocks
+    blocks: Blocks  # returns an iterator of lists of the lines of the file at each call; see `read_blocks`
     path: Path
-    first: int
-    delimiter: str | None
-    before: list[str]
-    sample: list[list[str]] = field(default_factory=list)
-    filled: bool = False
+    first: int  # how many lines precede the first row
+    delimiter: str | None  # None is white space
+    before: list[str]  # the last lines before the first row that are not empty
+    sample: list[list[str]] = field(default_factory=list)  # the words of the first rows
+    filled: bool = False  # whether cells without a number are read as NaN
 
     @property
     def width(self) -> int:

@@ -24,21 +24,11 @@ _PAGE = -1  # in place of a number of points: the entry is that of a further pag
 
 
 class Octree(NamedTuple):
-    """The nodes of a file.
+    """The nodes of a file."""
 
-    Attributes
-    ----------
-    low : ndarray, (3,)
-        The lowest corner of the root.
-    edge : float
-        Of the root.
-    entries : ndarray, (m,)
-        Of nodes with points, in the order of the file: level, cell, place, length and count.
-    """
-
-    low: Floats
-    edge: float
-    entries: Array
+    low: Floats  # (3,), the lowest corner of the root
+    edge: float  # of the root
+    entries: Array  # (m,), of nodes with points, in the order of the file: level, cell, place, length and count
 
     def nodes(self, box: Box | None, level: int | None) -> list[PackedChunk]:
         """Return the nodes up to a level, or of all, that meet a box, if there is one, by its two corners."""

@@ -21,28 +21,16 @@ _BINARY = {b"DSBB": "Surfer", b"DSRB": "Surfer", b"CDF\x01": "NetCDF", b"CDF\x02
 
 
 class Grid(NamedTuple):
-    """What the header of a grid states.
-
-    Attributes
-    ----------
-    columns, rows : int
-    start, step : (float, float)
-        The place x y of the first height, and from there to that of the next column and row.
-    missing : float
-        The height of cells without data.
-    head : int
-        How many lines come before the heights.
-    where : str
-        What the places are, in words.
-    """
+    """What the header of a grid states."""
 
     columns: int
     rows: int
+    # The place x y of the first height, and from there to that of the next column and row
     start: tuple[float, float]
     step: tuple[float, float]
-    missing: float
-    head: int
-    where: str
+    missing: float  # the height of cells without data
+    head: int  # how many lines come before the heights
+    where: str  # what the places are, in words
 
 
 def find_grid(path: Path) -> Grid | None:

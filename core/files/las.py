@@ -44,26 +44,13 @@ _MOST_DEGREES = 360.0
 
 
 class LasFile(NamedTuple):
-    """An open file.
-
-    Attributes
-    ----------
-    path : pathlib.Path
-    file : file object
-    reader : laspy.LasReader
-        At the first point.
-    chunks : list of PackedChunk
-        Of compressed points.
-    reference : Reference
-        What it states of its coordinates.
-    records : list of Record
-    """
+    """An open file."""
 
     path: Path
     file: BinaryIO
-    reader: Any
-    chunks: list[PackedChunk]
-    reference: Reference
+    reader: Any  # at the first point
+    chunks: list[PackedChunk]  # of compressed points
+    reference: Reference  # what it states of its coordinates
     records: list[Record]
 
     @property

@@ -21,26 +21,13 @@ _LATEST = 3  # version of these that lazrs reads
 
 
 class Record(NamedTuple):
-    """A record of a file.
+    """A record of a file."""
 
-    Attributes
-    ----------
-    user : str
-        Whose it is.
-    number : int
-    text : str
-        What it is.
-    data : bytes or None
-        None where it is longer than one before the points may be, or than the file.
-    after : bool
-        Whether it lies after the points.
-    """
-
-    user: str
+    user: str  # whose it is
     number: int
-    text: str
-    data: bytes | None
-    after: bool
+    text: str  # what it is
+    data: bytes | None  # None where it is longer than one before the points may be, or than the file
+    after: bool  # whether it lies after the points
 
 
 class PackedChunk(NamedTuple):

@@ -17,31 +17,15 @@ _UNIT = 1.02  # to which numbers of unit vectors, rounded to a few digits, go
 
 
 class Layout(NamedTuple):
-    """The columns of a text.
+    """The columns of a text."""
 
-    Attributes
-    ----------
-    names : list of str or None
-        None for columns without a name.
-    places : list of int
-        Indices of x y z.
-    others : list of int
-        Indices of other columns that are read.
-    notices : list of str
-    announced : int or None
-        How many points the line before them announces.
-    degrees : bool
-        Whether x and y are angles.
-    usual : sequence of str
-        Names of all columns that have none, unless they hold normals; empty where no such names are known.
-    """
-
-    names: Sequence[str | None]
-    places: list[int]
-    others: list[int]
+    names: Sequence[str | None]  # None for columns without a name
+    places: list[int]  # indices of x y z
+    others: list[int]  # indices of other columns that are read
     notices: list[str]
-    announced: int | None = None
-    degrees: bool = False
+    announced: int | None = None  # how many points the line before them announces
+    degrees: bool = False  # whether x and y are angles
+    # Names of all columns that have none, unless they hold normals; empty where no such names are known
     usual: Sequence[str] = ()
 
     def label(self, index: int) -> str:

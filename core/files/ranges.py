@@ -13,22 +13,13 @@ ColumnPieces: TypeAlias = Callable[[], Iterable[Columns]]  # the same each time:
 
 
 class Range(NamedTuple):
-    """The numbers of a column in all pieces.
+    """The numbers of a column in all pieces."""
 
-    Attributes
-    ----------
-    dtype : numpy.dtype
-        A type that holds all.
-    low, high : float or int
-        The least and the greatest; zero without any.
-    whole : bool
-        Whether all are whole numbers.
-    """
-
-    dtype: np.dtype[np.generic]
+    dtype: np.dtype[np.generic]  # a type that holds all
+    # The least and the greatest; zero without any
     low: float
     high: float
-    whole: bool
+    whole: bool  # whether all are whole numbers
 
 
 def ranges_of(pieces: ColumnPieces) -> tuple[int, dict[str, Range]]:

@@ -34,18 +34,10 @@ _CITED = {  # by what the name of a system says, as in "NAD83 / Oregon (ft)"
 
 
 class Unit(NamedTuple):
-    """A unit of length.
+    """A unit of length."""
 
-    Attributes
-    ----------
-    meters : float
-        Its length.
-    name : str
-        In the file; empty without one.
-    """
-
-    meters: float
-    name: str = ""
+    meters: float  # its length
+    name: str = ""  # in the file; empty without one
 
     def __str__(self) -> str:
         """Name it in the plural."""
@@ -65,17 +57,10 @@ class Unit(NamedTuple):
 
 
 class Reference(NamedTuple):
-    """What a file states of its coordinates.
+    """What a file states of its coordinates."""
 
-    Attributes
-    ----------
-    geographic : bool
-        Whether x and y are longitude and latitude.
-    horizontal, vertical : Unit or None
-        Of x and y, and of z; None where the file does not tell.
-    """
-
-    geographic: bool = False
+    geographic: bool = False  # whether x and y are longitude and latitude
+    # Of x and y, and of z; None where the file does not tell
     horizontal: Unit | None = None
     vertical: Unit | None = None
 

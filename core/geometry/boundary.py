@@ -31,23 +31,13 @@ _KINK = 2.0  # factor by which a fit to one side of a corner must scatter less, 
 
 @dataclass(frozen=True)
 class Boundary:
-    """Where the surface ends: for every point the nearest boundary and, next to a corner, the second one.
+    """Where the surface ends: for every point the nearest boundary and, next to a corner, the second one."""
 
-    Attributes
-    ----------
-    at_boundary : ndarray, (m,) bool
-    distance : ndarray, (m, 2)
-        Distance to the boundary along the surface; infinite far from any.
-    curvature : ndarray, (m, 2)
-        Geodesic curvature of the boundary there: 1 / R for a disc of radius R, negative around a hole.
-    outward : ndarray, (m, 2, 3)
-        Unit vector across the boundary; zero where it is not known.
-    """
-
-    at_boundary: Bools
-    distance: Floats
+    at_boundary: Bools  # (m,)
+    distance: Floats  # (m, 2), distance to the boundary along the surface; infinite far from any
+    # (m, 2), geodesic curvature of the boundary there: 1 / R for a disc of radius R, negative around a hole
     curvature: Floats
-    outward: Floats
+    outward: Floats  # (m, 2, 3), unit vector across the boundary; zero where it is not known
 
     def reached(self, lengths: Floats) -> Bools:
         """Tell from which points a kernel of these smoothing lengths reaches beyond the boundary, (m,) bool."""

@@ -24,22 +24,13 @@ _CLOSEST = 1e-6  # spacings to the nearest cut, at least: its inverse is so long
 
 @dataclass(frozen=True)
 class Cells:
-    """Voronoi cells.
+    """Voronoi cells."""
 
-    Attributes
-    ----------
-    areas : ndarray, (m,)
-        Their areas, all positive.
-    radius : ndarray, (m,)
-        Distance of the furthest corner: the radius of the largest empty disc that touches the point. Half an even
-        spacing or a little more; larger where points are irregular, or sparser in one direction than in the other.
-    corner : ndarray, (m, 2)
-        The way to it, where that disc has its center, along the tangents of `frames`.
-    """
-
-    areas: Floats
+    areas: Floats  # (m,), their areas, all positive
+    # (m,), distance of the furthest corner: the radius of the largest empty disc that touches the point. Half an even
+    # spacing or a little more; larger where points are irregular, or sparser in one direction than in the other
     radius: Floats
-    corner: Floats
+    corner: Floats  # (m, 2), the way to it, where that disc has its center, along the tangents of `frames`
 
 
 def measure_cells(

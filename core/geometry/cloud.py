@@ -67,68 +67,29 @@ class Surface:
 
 @dataclass(frozen=True)
 class Cloud:
-    """The quantities measured on a cloud, in scaled coordinates.
+    """The quantities measured on a cloud, in scaled coordinates."""
 
-    Attributes
-    ----------
-    scaled : ScaledPoints
-        The m distinct points that take part, and how they map to the caller's.
-    component : ndarray, (m,) int
-        Component of each point.
-    normals : ndarray, (m, 3)
-        Unit normals.
-    sides : Sides
-        The smooth sides that the points lie on, between edges, towards the same side of the surface.
-    moved : ndarray, (m, 3)
-        Offsets by which the points were moved to smooth noise.
-    shape_operator : ndarray, (m, 3, 3)
-        Second fundamental form of local quadrics, positive where the surface curves away from the normal.
-    gaussian_curvature : ndarray, (m,)
-        Of local quadrics.
-    curvature_scatter : ndarray, (m,)
-        Of their mean curvature, over that of noise across the surface.
-    cell_areas : ndarray, (m,)
-        Areas of the points' Voronoi cells.
-    cell_radius : ndarray, (m,)
-        Distance of the furthest corner of each cell from its point.
-    disc_radii : ndarray, (m,)
-        Of discs to be drawn: `disc_radii`.
-    spacing : ndarray, (m,)
-        Distance between neighboring points.
-    misfit : ndarray, (m,)
-        Root mean square distance of the neighbors from the quadric.
-    squared_slope : ndarray, (m,)
-        Mean squared slope of the roughness that is finer than the normals resolve; zero where it is noise.
-    cause : ndarray, (m,) int
-        Of `Doubt`: why results would be in doubt.
-    boundary : Boundary
-    pairs : Pairs
-        Points as moved, smoothing lengths and pairs.
-    decisions : Decisions
-        What is decided for the points as a whole.
-    notices : list of str
-        Texts for the user.
-    """
-
-    scaled: ScaledPoints
-    component: Ints
-    normals: Floats
-    sides: Sides
-    moved: Floats
+    scaled: ScaledPoints  # the m distinct points that take part, and how they map to the caller's
+    component: Ints  # (m,), component of each point
+    normals: Floats  # (m, 3), unit normals
+    sides: Sides  # the smooth sides that the points lie on, between edges, towards the same side of the surface
+    moved: Floats  # (m, 3), offsets by which the points were moved to smooth noise
+    # (m, 3, 3), second fundamental form of local quadrics, positive where the surface curves away from the normal
     shape_operator: Floats
-    gaussian_curvature: Floats
-    curvature_scatter: Floats
-    cell_areas: Floats
-    cell_radius: Floats
-    disc_radii: Floats
-    spacing: Floats
-    misfit: Floats
+    gaussian_curvature: Floats  # (m,), of local quadrics
+    curvature_scatter: Floats  # (m,), of their mean curvature, over that of noise across the surface
+    cell_areas: Floats  # (m,), areas of the points' Voronoi cells
+    cell_radius: Floats  # (m,), distance of the furthest corner of each cell from its point
+    disc_radii: Floats  # (m,), of discs to be drawn: `disc_radii`
+    spacing: Floats  # (m,), distance between neighboring points
+    misfit: Floats  # (m,), root mean square distance of the neighbors from the quadric
+    # (m,), mean squared slope of the roughness that is finer than the normals resolve; zero where it is noise
     squared_slope: Floats
-    cause: Ints
+    cause: Ints  # (m,), of `Doubt`: why results would be in doubt
     boundary: Boundary
-    pairs: Pairs
-    decisions: Decisions
-    notices: list[str]
+    pairs: Pairs  # points as moved, smoothing lengths and pairs
+    decisions: Decisions  # what is decided for the points as a whole
+    notices: list[str]  # texts for the user
 
 
 def read_cloud(

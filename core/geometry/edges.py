@@ -21,24 +21,14 @@ _BLOCK = 1 << 12  # points fitted at one time
 
 @dataclass(frozen=True)
 class Sides:
-    """The smooth side that each point lies on, up to the edges next to it.
+    """The smooth side that each point lies on, up to the edges next to it."""
 
-    Attributes
-    ----------
-    normals : ndarray, (m, 3)
-        Unit normals.
-    shape_operator : ndarray, (m, 3, 3)
-        As of `Quadrics`.
-    sharp : ndarray, (m,)
-        How sure it is that an edge is near, from 0 to 1. At zero, normal and bend are those of the quadric.
-    around : ndarray, (m, 3)
-        Unit normals of the quadrics through all neighbors, towards the same side of the surface: across an edge, too,
-        they tell whether two points see the same one.
-    """
-
-    normals: Floats
-    shape_operator: Floats
+    normals: Floats  # (m, 3), unit normals
+    shape_operator: Floats  # (m, 3, 3), as of `Quadrics`
+    # (m,), how sure it is that an edge is near, from 0 to 1. At zero, normal and bend are those of the quadric
     sharp: Floats
+    # (m, 3), unit normals of the quadrics through all neighbors, towards the same side of the surface: across an edge,
+    # too, they tell whether two points see the same one
     around: Floats
 
     def turn(self, first: Ints, second: Ints, chord: Floats, side: Floats) -> Floats:

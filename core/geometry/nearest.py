@@ -30,25 +30,14 @@ _MEASURED = 100_000  # points whose neighbors are searched for in a tenth of a s
 
 @dataclass(frozen=True)
 class Nearest:
-    """The 40 nearest neighbors of every point.
+    """The 40 nearest neighbors of every point."""
 
-    Attributes
-    ----------
-    tree : cKDTree
-        Of m points; components stand far apart in it.
-    index : ndarray, (m, 41) int
-        Neighbors by distance, the point itself first.
-    distance : ndarray, (m, 41)
-    weight : ndarray, (m, 41)
-        From 1 at the point to 0 at its last neighbor; 0 too for neighbors on another sheet of the surface.
-    in_row : ndarray, (m,) bool
-        Points that crowd along a row, so that their neighbors are not simply the nearest: see `look_across_rows`.
-    """
-
-    tree: cKDTree
-    index: Ints
-    distance: Floats
+    tree: cKDTree  # of m points; components stand far apart in it
+    index: Ints  # (m, 41), neighbors by distance, the point itself first
+    distance: Floats  # (m, 41)
+    # (m, 41), from 1 at the point to 0 at its last neighbor; 0 too for neighbors on another sheet of the surface
     weight: Floats
+    # (m,), points that crowd along a row, so that their neighbors are not simply the nearest: see `look_across_rows`
     in_row: Bools
 
     @property

@@ -25,25 +25,14 @@ _GROUPS = 4  # groups of points by their number of candidates, for each doubling
 
 @dataclass(frozen=True)
 class Pairs:
-    """Points and all pairs nearer than 3 h_ij, each once.
+    """Points and all pairs nearer than 3 h_ij, each once."""
 
-    Attributes
-    ----------
-    points : ndarray, (m, 3)
-        In scaled coordinates; components stand far apart.
-    lengths : ndarray, (m,)
-        Smoothing lengths h; h_ij is the mean of both ends.
-    first, second : ndarray, (pairs,) int32
-        The two points of each pair, ordered by the first.
-    distance : ndarray, (pairs,)
-        Their distance in space.
-    """
-
-    points: Floats
-    lengths: Floats
+    points: Floats  # (m, 3), in scaled coordinates; components stand far apart
+    lengths: Floats  # (m,), smoothing lengths h; h_ij is the mean of both ends
+    # (pairs,) int32, the two points of each pair, ordered by the first
     first: Ints
     second: Ints
-    distance: Floats
+    distance: Floats  # (pairs,), their distance in space
 
     def keep(self, kept: Bools) -> Self:
         """Return the same points with some of the pairs, (pairs,) bool."""

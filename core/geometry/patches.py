@@ -13,27 +13,13 @@ _PAIRS = 1 << 16  # of a patch, about: of fewer, and Python's share of the work 
 
 @dataclass(frozen=True)
 class Patch:
-    """Some of the pairs, ordered by their first points, and the points at their ends.
+    """Some of the pairs, ordered by their first points, and the points at their ends."""
 
-    Attributes
-    ----------
-    pairs : slice
-        Which of all pairs.
-    rows : ndarray, (k,) int
-        The first points, each once.
-    columns : ndarray, (l,) int
-        The second points, each once.
-    counts : ndarray, (k,) int
-        How many pairs each first point has.
-    ends : csc_array, (l, k)
-        Which second point each pair leads to; its values are scratch for sums.
-    """
-
-    pairs: slice
-    rows: Ints
-    columns: Ints
-    counts: Ints
-    ends: sparse.csc_array
+    pairs: slice  # which of all pairs
+    rows: Ints  # (k,), the first points, each once
+    columns: Ints  # (l,), the second points, each once
+    counts: Ints  # (k,), how many pairs each first point has
+    ends: sparse.csc_array  # (l, k), which second point each pair leads to; its values are scratch for sums
 
     def first(self, values: Array) -> Array:
         """Return quantities of points, (..., m), at the first point of each pair, (..., pairs)."""

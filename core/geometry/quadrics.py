@@ -20,35 +20,20 @@ _RIDGE = 1e-10  # keeps the normal equations solvable where the neighbors lie on
 
 @dataclass(frozen=True)
 class Quadrics:
-    """A quadric through the neighbors of every point.
+    """A quadric through the neighbors of every point."""
 
-    Attributes
-    ----------
-    normals : ndarray, (m, 3)
-        Unit normals.
-    gaussian_curvature : ndarray, (m,)
-        Gaussian curvature [1 / L^2].
-    height : ndarray, (m, 3)
-        From the point to the quadric, across it [L].
-    shape_operator : ndarray, (m, 3, 3)
-        Second fundamental form: ``t . shape_operator t`` is the curvature along the unit tangent t, positive where the
-        surface curves away from the normal.
-    misfit : ndarray, (m,)
-        Root mean square distance of the neighbors from the quadric [L].
-    scatter : ndarray, (m,)
-        Standard deviation of the mean curvature over that of noise across the surface [1 / L^2], by the places of the
-        neighbors, within a tenth where these lie around the point.
-    roundness : ndarray, (m,)
-        Variance of the neighbors across over that along: next to zero on a curve, which has no normal; one where the
-        normal was given.
-    """
-
-    normals: Floats
-    gaussian_curvature: Floats
-    height: Floats
+    normals: Floats  # (m, 3), unit normals
+    gaussian_curvature: Floats  # (m,), Gaussian curvature [1 / L^2]
+    height: Floats  # (m, 3), from the point to the quadric, across it [L]
+    # (m, 3, 3), second fundamental form: ``t . shape_operator t`` is the curvature along the unit tangent t, positive
+    # where the surface curves away from the normal
     shape_operator: Floats
-    misfit: Floats
+    misfit: Floats  # (m,), root mean square distance of the neighbors from the quadric [L]
+    # (m,), standard deviation of the mean curvature over that of noise across the surface [1 / L^2], by the places of
+    # the neighbors, within a tenth where these lie around the point
     scatter: Floats
+    # (m,), variance of the neighbors across over that along: next to zero on a curve, which has no normal; one where
+    # the normal was given
     roundness: Floats
 
     def take(self, rows: Ints) -> "Quadrics":

@@ -37,21 +37,11 @@ _BLOCK = 1 << 10  # points fitted at one time
 
 
 class Smoothed(NamedTuple):
-    """Points smoothed along the direction in which they were rounded.
+    """Points smoothed along the direction in which they were rounded."""
 
-    Attributes
-    ----------
-    nearest : Nearest
-        Of the points where they were moved to.
-    noise : ndarray, (m,)
-        Scatter that was smoothed, as a share of the spacing; zero where a point was left as it was.
-    step : float
-        Usual distance from level to level, as a share of the spacing; zero where no point was moved.
-    """
-
-    nearest: Nearest
-    noise: Floats
-    step: float
+    nearest: Nearest  # of the points where they were moved to
+    noise: Floats  # (m,), scatter that was smoothed, as a share of the spacing; zero where a point was left as it was
+    step: float  # usual distance from level to level, as a share of the spacing; zero where no point was moved
 
 
 def smooth_rounded(

@@ -11,34 +11,20 @@ from .scaled import ScaledPoints
 
 @dataclass(frozen=True)
 class Sample:
-    """The points that take part, by component, in scaled coordinates.
+    """The points that take part, by component, in scaled coordinates."""
 
-    Attributes
-    ----------
-    scaled : ScaledPoints
-        The m distinct points, and how they map to the caller's.
-    component : ndarray, (m,) int
-        Of each point, the largest 0.
-    nearest : Nearest
-        Neighbors of each point; components stand far apart there, and noisy points are where they were moved to.
-    noise : ndarray, (m,)
-        Noise that was smoothed at each point, as a share of the spacing; zero where none was.
-    scatter : ndarray, (2, m)
-        What quadrics missed the neighbors of each point by before that, see `likely_causes`; zero until it is known.
-    step : float
-        Distance from level to level where depth is rounded so coarsely that this was smoothed, as a share of the
-        spacing; zero elsewhere.
-    decisions : Decisions
-        What is decided for the points as a whole.
-    """
-
-    scaled: ScaledPoints
-    component: Ints
+    scaled: ScaledPoints  # the m distinct points, and how they map to the caller's
+    component: Ints  # (m,), of each point, the largest 0
+    # Neighbors of each point; components stand far apart there, and noisy points are where they were moved to
     nearest: Nearest
-    noise: Floats
+    noise: Floats  # (m,), noise that was smoothed at each point, as a share of the spacing; zero where none was
+    # (2, m), what quadrics missed the neighbors of each point by before that, see `likely_causes`; zero until it is
+    # known
     scatter: Floats
+    # Distance from level to level where depth is rounded so coarsely that this was smoothed, as a share of the spacing;
+    # zero elsewhere
     step: float = 0.0
-    decisions: Decisions = field(default_factory=Decisions)
+    decisions: Decisions = field(default_factory=Decisions)  # what is decided for the points as a whole
 
     @property
     def moved(self) -> Floats:

@@ -10,27 +10,14 @@ from ..types import Array, Bools, Floats, Ints
 
 @dataclass(frozen=True)
 class ScaledPoints:
-    """Distinct points, centered and divided by their root mean square radius.
+    """Distinct points, centered and divided by their root mean square radius."""
 
-    Attributes
-    ----------
-    points : ndarray, (m, 3)
-        Distinct points in scaled coordinates, in the order of a k-d tree, which keeps neighbors near in memory.
-    scale : float
-        The root mean square radius [L]: caller's length = scale * scaled length.
-    inverse : ndarray, (n,) int
-        For each of the caller's points, its row in `points`; -1 for points that were left out.
-    copies : ndarray, (m,) int
-        How many of the caller's points share each row.
-    first : ndarray, (m,) int
-        The caller's point that each row was first seen at.
-    """
-
+    # (m, 3), distinct points in scaled coordinates, in the order of a k-d tree, which keeps neighbors near in memory
     points: Floats
-    scale: float
-    inverse: Ints
-    copies: Ints
-    first: Ints
+    scale: float  # the root mean square radius [L]: caller's length = scale * scaled length
+    inverse: Ints  # (n,), for each of the caller's points, its row in `points`; -1 for points that were left out
+    copies: Ints  # (m,), how many of the caller's points share each row
+    first: Ints  # (m,), the caller's point that each row was first seen at
 
     @property
     def shared(self) -> bool:

@@ -65,24 +65,12 @@ def on_sheet(
 
 
 class Sheets(NamedTuple):
-    """What is known of the sheet around every point, made by `fit_sheets`.
+    """What is known of the sheet around every point, made by `fit_sheets`."""
 
-    Attributes
-    ----------
-    quadrics : Quadrics
-        Of the m points, through neighbors on their own sheets.
-    nearest : Nearest
-        With the neighbors on other sheets at weight zero.
-    mixed : Quadrics
-        Through all neighbors.
-    planes : ndarray, (m, 3)
-        Unit normals by which neighbors on other sheets were found.
-    """
-
-    quadrics: Quadrics
-    nearest: Nearest
-    mixed: Quadrics
-    planes: Floats
+    quadrics: Quadrics  # of the m points, through neighbors on their own sheets
+    nearest: Nearest  # with the neighbors on other sheets at weight zero
+    mixed: Quadrics  # through all neighbors
+    planes: Floats  # (m, 3), unit normals by which neighbors on other sheets were found
 
     def take(self, rows: Ints, nearest: Nearest) -> Sheets:
         """Return those of some rows, (k,) int, by the neighbors of these points."""

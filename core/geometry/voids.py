@@ -22,24 +22,13 @@ _LONG = 5.0  # twice the standard deviation of a slit along its length, over its
 
 @dataclass(frozen=True)
 class Voids:
-    """Voids between points.
+    """Voids between points."""
 
-    Attributes
-    ----------
-    rims : ndarray, (k,) int
-        Points around those that are far longer than wide.
-    bridged : ndarray, (l,) int
-        Points around others, which are too round or too narrow to be told from uneven sampling by them alone.
-    label : ndarray, (l,) int
-        Which of these it is.
-    radius : ndarray, (l,)
-        Of the empty disc that touches the point.
-    """
-
-    rims: Ints
+    rims: Ints  # (k,), points around those that are far longer than wide
+    # (l,), points around others, which are too round or too narrow to be told from uneven sampling by them alone
     bridged: Ints
-    label: Ints
-    radius: Floats
+    label: Ints  # (l,), which of these it is
+    radius: Floats  # (l,), of the empty disc that touches the point
 
     def notices(self, sample: Sample, at_boundary: Bools) -> list[str]:
         """Return a text on the voids that the surface goes on over, by the boundary that was found, (m,) bool."""

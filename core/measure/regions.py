@@ -357,30 +357,16 @@ def _boundary_lengths(areas: Floats, distance: Floats, spacing: Floats) -> Float
 
 
 class _Line(NamedTuple):
-    """Pieces of the line between members and others.
+    """Pieces of the line between members and others."""
 
-    Attributes
-    ----------
-    feet : ndarray, (m, 3)
-        Places on it.
-    normals, inward : ndarray, (m, 3)
-        Unit vectors across the surface, and along it to the members.
-    bend : ndarray, (m,)
-        Curvature of the line in the surface, positive where it bends towards the members.
-    spacing : ndarray, (m,)
-        Of the points.
-    component : ndarray, (m,) int
-    lost : ndarray, (r,)
-        Spacing of the points next to the line where no piece of it is found.
-    """
-
-    feet: Floats
+    feet: Floats  # (m, 3), places on it
+    # (m, 3), unit vectors across the surface, and along it to the members
     normals: Floats
     inward: Floats
-    bend: Floats
-    spacing: Floats
-    component: Ints
-    lost: Floats
+    bend: Floats  # (m,), curvature of the line in the surface, positive where it bends towards the members
+    spacing: Floats  # (m,), of the points
+    component: Ints  # (m,)
+    lost: Floats  # (r,), spacing of the points next to the line where no piece of it is found
 
     def distances(self, laplacian: LaplaceBeltrami, rows: Ints) -> tuple[Ints, Floats, Floats]:
         """Measure points near the line, those of some rows that are on its sheet.

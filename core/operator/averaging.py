@@ -24,17 +24,10 @@ _LEAST = 1e-3  # of the spacing: less noise is ignored, such as that of rounded 
 
 @dataclass(frozen=True)
 class Settled:
-    """A quantity with as much averaging as its noise asks for.
+    """A quantity with as much averaging as its noise asks for."""
 
-    Attributes
-    ----------
-    values : ndarray, (n, k)
-    variance : ndarray, (n,)
-        What noise leaves in them, the sum over all k.
-    """
-
-    values: Floats
-    variance: Floats
+    values: Floats  # (n, k)
+    variance: Floats  # (n,), what noise leaves in them, the sum over all k
 
 
 class Averages:

@@ -17,21 +17,12 @@ _SEEN = 3  # nearest points examined for each that is joined: those of close she
 
 @dataclass(frozen=True)
 class NearGraph:
-    """Distinct positions of a cloud, joined to their nearest neighbors along the surface.
+    """Distinct positions of a cloud, joined to their nearest neighbors along the surface."""
 
-    Attributes
-    ----------
-    lengths : csr_array, (m, m)
-        Symmetric; distances of joined positions [L], all positive. All positions of a component are connected.
-    place : ndarray, (n,) int
-        Row of each of the caller's points, the same for coincident points; -1 for points left out.
-    first : ndarray, (m,) int
-        One of the caller's points at each position.
-    """
-
+    # (m, m), symmetric; distances of joined positions [L], all positive. All positions of a component are connected
     lengths: sparse.csr_array
-    place: Ints
-    first: Ints
+    place: Ints  # (n,), row of each of the caller's points, the same for coincident points; -1 for points left out
+    first: Ints  # (m,), one of the caller's points at each position
 
     def scatter(self, quantity: Array, neutral: bool | int) -> Array:
         """Return a quantity of the rows, (m,), for the caller's points; those left out get the neutral value."""

@@ -18,33 +18,17 @@ _BELONGS = 3.0  # spacings from the nearest point within which a place of the su
 
 
 class Heights(NamedTuple):
-    """What is known at some places near a surface.
+    """What is known at some places near a surface."""
 
-    Attributes
-    ----------
-    height : ndarray, (k,)
-        Distance from the surface, positive on the side of the normals: exact for quadrics, to second order.
-    normal : ndarray, (k, 3)
-        Unit normals of the surface nearby.
-    nearest : ndarray, (k,) int
-        The nearest point.
-    spacing : ndarray, (k,)
-        Of the points there.
-    distance : ndarray, (k,)
-        From the nearest point, in spacings of the points there.
-    beyond : ndarray, (k,)
-        How far the place lies beyond the boundary of the surface; negative inside, -inf where none is near.
-    outward : ndarray, (k, 3)
-        Unit vector across that boundary; zero where none is near.
-    """
-
+    # (k,), distance from the surface, positive on the side of the normals: exact for quadrics, to second order
     height: Floats
-    normal: Floats
-    nearest: Ints
-    spacing: Floats
-    distance: Floats
+    normal: Floats  # (k, 3), unit normals of the surface nearby
+    nearest: Ints  # (k,), the nearest point
+    spacing: Floats  # (k,), of the points there
+    distance: Floats  # (k,), from the nearest point, in spacings of the points there
+    # (k,), how far the place lies beyond the boundary of the surface; negative inside, -inf where none is near
     beyond: Floats
-    outward: Floats
+    outward: Floats  # (k, 3), unit vector across that boundary; zero where none is near
 
     @property
     def support(self) -> Floats:

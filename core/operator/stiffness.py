@@ -17,46 +17,26 @@ from .weights import balance_weights
 
 @dataclass(frozen=True)
 class Stiffness:
-    """The weak form of the operator, and measures of its weights.
+    """The weak form of the operator, and measures of its weights."""
 
-    Attributes
-    ----------
-    matrix : csr_array, (n, n)
-        Symmetric, rows sum to zero, columns sorted; without units, so the same in any scale.
-    images : csr_array, (n, n)
-        Symmetric weights of the images in one boundary that the matrix holds, those of points in their own image on the
-        diagonal. (An image of an image, across a corner, has the point's value whatever holds at the boundary.)
-    residual : ndarray, (m,)
-        Relative residual of the moments of the weights around each distinct point.
-    widths : ndarray, (m,)
-        Smoothing length of the kernel whose fourth moment the weights have; zero for no symbol correction.
-    """
-
+    # (n, n), symmetric, rows sum to zero, columns sorted; without units, so the same in any scale
     matrix: sparse.csr_array
+    # (n, n), symmetric weights of the images in one boundary that the matrix holds, those of points in their own image
+    # on the diagonal. (An image of an image, across a corner, has the point's value whatever holds at the boundary.)
     images: sparse.csr_array
-    residual: Floats
+    residual: Floats  # (m,), relative residual of the moments of the weights around each distinct point
+    # (m,), smoothing length of the kernel whose fourth moment the weights have; zero for no symbol correction
     widths: Floats
 
 
 @dataclass(frozen=True)
 class _Images:
-    """Weights of images in boundaries.
+    """Weights of images in boundaries."""
 
-    Attributes
-    ----------
-    rows : ndarray, (k,) int
-        Whose image each is: a pair's or a point's. A row has up to three of them.
-    weights : ndarray, (k,)
-    fourth : ndarray, (k,)
-        Fourth moment of the weight, less that at the distance of the pair itself.
-    once : ndarray, (k,) bool
-        Those in one boundary; others are images of images.
-    """
-
-    rows: Ints
-    weights: Floats
-    fourth: Floats
-    once: Bools
+    rows: Ints  # (k,), whose image each is: a pair's or a point's. A row has up to three of them
+    weights: Floats  # (k,)
+    fourth: Floats  # (k,), fourth moment of the weight, less that at the distance of the pair itself
+    once: Bools  # (k,), those in one boundary; others are images of images
 
 
 def assemble_stiffness(

@@ -21,18 +21,10 @@ _FASTEST = 2.5  # bound of the preconditioned eigenvalues: 2, and a margin, as t
 
 @dataclass(frozen=True)
 class Balance:
-    """Balanced weights and how well their moments are met.
+    """Balanced weights and how well their moments are met."""
 
-    Attributes
-    ----------
-    factor : ndarray, (p,)
-        By which each pair's weight is multiplied, positive.
-    residual : ndarray, (m,)
-        Relative error of the moments of each point.
-    """
-
-    factor: Floats
-    residual: Floats
+    factor: Floats  # (p,), by which each pair's weight is multiplied, positive
+    residual: Floats  # (m,), relative error of the moments of each point
 
 
 def balance_weights(

@@ -21,20 +21,11 @@ TAU = 2.0**-52  # the paper's lower bound of eq. (8), in scaled coordinates
 
 @dataclass(frozen=True)
 class AreaSolution:
-    """Areas and how they were found.
+    """Areas and how they were found."""
 
-    Attributes
-    ----------
-    areas : ndarray, (n,)
-        Area elements.
-    products : int
-        Products with the kernel matrix.
-    residual : float
-        Relative residual of the equations where the solver did not reach its tolerance, and zero where it did.
-    """
-
-    areas: Floats
-    products: int
+    areas: Floats  # (n,), area elements
+    products: int  # products with the kernel matrix
+    # Relative residual of the equations where the solver did not reach its tolerance, and zero where it did
     residual: float = 0.0
 
 

@@ -226,25 +226,13 @@ def _nearest_known(laplacian: LaplaceBeltrami, known: Ints, rows: Ints) -> Ints:
 
 @dataclass(frozen=True)
 class _Surface:
-    """Points of a surface to solve on: all that the operator keeps, or some of many with an operator of their own.
+    """Points of a surface to solve on: all that the operator keeps, or some of many with an operator of their own."""
 
-    Attributes
-    ----------
-    rows : ndarray, (m,) int
-        Which points.
-    points : ndarray, (m, 3)
-        On the surface [L].
-    stiffness : csr_array, (m, m)
-        Of sheets that touch, each on its own.
-    areas : ndarray, (m,)
-    carry : callable
-        From values (m, k) to those of all points, (n, k); points that are left out have those of the nearest one.
-    """
-
-    rows: Ints
-    points: Floats
-    stiffness: sparse.csr_array
-    areas: Floats
+    rows: Ints  # (m,), which points
+    points: Floats  # (m, 3), on the surface [L]
+    stiffness: sparse.csr_array  # (m, m), of sheets that touch, each on its own
+    areas: Floats  # (m,)
+    # From values (m, k) to those of all points, (n, k); points that are left out have those of the nearest one
     carry: Callable[[Floats], Floats]
 
 

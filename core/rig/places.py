@@ -159,28 +159,15 @@ def usual_distance(sources: Sequence[LaplaceBeltrami]) -> float:
 
 @dataclass(frozen=True)
 class _Sheets:
-    """The points of a surface that the operator keeps, by sheets.
+    """The points of a surface that the operator keeps, by sheets."""
 
-    Attributes
-    ----------
-    kept : ndarray, (m,) int
-        Which points.
-    normals : ndarray, (m, 3)
-    forms : ndarray, (m, 3, 3)
-        Shape operators, with the signs of these normals.
-    label : ndarray, (m,) int
-        Number of the sheet of each.
-    open : ndarray, (sheets,) bool
-        Sheets with a boundary, whose normals may have either side.
-    mixed : ndarray, (sheets,) bool
-        Sheets of a component that has several, whose normals may have either side point by point, near a contact.
-    """
-
-    kept: Ints
-    normals: Floats
-    forms: Floats
-    label: Ints
-    open: Bools
+    kept: Ints  # (m,), which points
+    normals: Floats  # (m, 3)
+    forms: Floats  # (m, 3, 3), shape operators, with the signs of these normals
+    label: Ints  # (m,), number of the sheet of each
+    open: Bools  # (sheets,), sheets with a boundary, whose normals may have either side
+    # (sheets,), sheets of a component that has several, whose normals may have either side point by point, near a
+    # contact
     mixed: Bools
 
 

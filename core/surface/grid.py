@@ -126,29 +126,16 @@ class Levels:
 
 @dataclass(frozen=True)
 class Grid:
-    """Corners of voxels near a surface, and the edges between them, none of which holds another corner.
-
-    Attributes
-    ----------
-    levels : Levels
-    corners : ndarray, (c, 3) int
-        In units of the finest voxel.
-    places : ndarray, (c, 3)
-        The same in the units of the surface.
-    first, second : ndarray, (e,) int
-        The corners that edges begin and end at.
-    axis : ndarray, (e,) int
-    length : ndarray, (e,)
-        In the units of the surface.
-    """
+    """Corners of voxels near a surface, and the edges between them, none of which holds another corner."""
 
     levels: Levels
-    corners: Ints
-    places: Floats
+    corners: Ints  # (c, 3), in units of the finest voxel
+    places: Floats  # (c, 3), the same in the units of the surface
+    # (e,), the corners that edges begin and end at
     first: Ints
     second: Ints
-    axis: Ints
-    length: Array
+    axis: Ints  # (e,)
+    length: Array  # (e,), in the units of the surface
 
     def around(self, edges: Ints) -> tuple[Ints, Ints]:
         """Return the lowest corners, (k, 4, 3) int, and levels, (k, 4) int, of the voxels around edges, in a circle."""

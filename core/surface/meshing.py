@@ -194,23 +194,12 @@ def _check_memory(corners: float, detail: float) -> None:
 
 
 class _Cuts(NamedTuple):
-    """The edges of a grid that a surface cuts.
+    """The edges of a grid that a surface cuts."""
 
-    Attributes
-    ----------
-    edges : ndarray, (k,) int
-    ahead : ndarray, (k,) bool
-        Whether the outer side is ahead along them.
-    places : ndarray, (k, 3)
-        Where they are cut.
-    belongs : ndarray, (k,) bool
-        Whether the surface there is that of the points.
-    """
-
-    edges: Ints
-    ahead: Bools
-    places: Floats
-    belongs: Bools
+    edges: Ints  # (k,)
+    ahead: Bools  # (k,), whether the outer side is ahead along them
+    places: Floats  # (k, 3), where they are cut
+    belongs: Bools  # (k,), whether the surface there is that of the points
 
 
 def _cuts(surface: ImplicitSurface, grid: Grid, width: Array, report: Callable[[], None]) -> _Cuts:

@@ -55,21 +55,11 @@ def label_links(site: Site, scaled: ScaledPoints, index: Ints, joined: Bools) ->
 
 
 class Merged(NamedTuple):
-    """Labels of all tiles, merged.
+    """Labels of all tiles, merged."""
 
-    Attributes
-    ----------
-    start : ndarray, (tiles + 1,) int
-        Where the labels of each tile begin among those of all.
-    label : ndarray, (labels,) int
-        The merged label of each label of each tile.
-    size : ndarray, (merged,) int
-        How many distinct points have each merged one.
-    """
-
-    start: Ints
-    label: Ints
-    size: Ints
+    start: Ints  # (tiles + 1,), where the labels of each tile begin among those of all
+    label: Ints  # (labels,), the merged label of each label of each tile
+    size: Ints  # (merged,), how many distinct points have each merged one
 
 
 def merge_labels(store: Store, step: str) -> Merged:

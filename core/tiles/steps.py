@@ -47,33 +47,19 @@ def _of_one_length(options: LaplacianOptions) -> bool:
 
 @dataclass(frozen=True)
 class Step:
-    """A step of the walk.
-
-    Attributes
-    ----------
-    name : str
-    stage : str
-        What it is for, in words of the user.
-    cost : float
-        CPU time over all tiles, against that of the others: seconds for 500,000 points of a torus.
-    local : callable
-        From the site of a tile, and the state that an earlier step has left there, to a new state, or None where that
-        one stays, and to what the step tells of the tile.
-    merge : callable
-        From the store and the options to what all tiles agree on then: small against the points.
-    where : callable
-        From the store to the numbers of the tiles at which the step is needed.
-    needed : callable
-        From the options to whether they ask for it.
-    """
+    """A step of the walk."""
 
     name: str
-    stage: str
-    cost: float
+    stage: str  # what it is for, in words of the user
+    cost: float  # CPU time over all tiles, against that of the others: seconds for 500,000 points of a torus
+    # From the site of a tile, and the state that an earlier step has left there, to a new state, or None where that one
+    # stays, and to what the step tells of the tile
     local: Callable[[Site, Any], tuple[Any, Told]]
+    # From the store and the options to what all tiles agree on then: small against the points
     merge: Callable[[Store, LaplacianOptions], Record] = _nothing
+    # From the store to the numbers of the tiles at which the step is needed
     where: Callable[[Store], Sequence[int]] = _all
-    needed: Callable[[LaplacianOptions], bool] = _always
+    needed: Callable[[LaplacianOptions], bool] = _always  # from the options to whether they ask for it
 
 
 _SURVEY = (

@@ -33,27 +33,14 @@ Record: TypeAlias = dict[str, Array]  # what all tiles have agreed on so far, by
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """The points of a tile with its halo, and whose they are.
+    """The points of a tile with its halo, and whose they are."""
 
-    Attributes
-    ----------
-    points : ndarray, (k, 3)
-        Coordinates [L].
-    inner : ndarray, (k,) bool
-        Which lie in the box; each point lies in that of one tile.
-    close : ndarray, (k,) bool
-        Which lie in the box or in the nearer half of the halo: the far end tells less, as its neighbors are missing.
-    owner : ndarray, (k,) int
-        The tile in whose box each point lies.
-    place : ndarray, (k,) int
-        Its place among the points in that box.
-    """
-
-    points: Floats
-    inner: Bools
+    points: Floats  # (k, 3), coordinates [L]
+    inner: Bools  # (k,), which lie in the box; each point lies in that of one tile
+    # (k,), which lie in the box or in the nearer half of the halo: the far end tells less, as its neighbors are missing
     close: Bools
-    owner: Ints
-    place: Ints
+    owner: Ints  # (k,), the tile in whose box each point lies
+    place: Ints  # (k,), its place among the points in that box
 
 
 class Store:

@@ -13,27 +13,13 @@ from .pose import State
 
 
 class Moved(NamedTuple):
-    """A deformed object.
+    """A deformed object."""
 
-    Attributes
-    ----------
-    points : ndarray, (n, 3), or None
-        What the next step starts from.
-    displacement : ndarray, (n, 3)
-        In local space.
-    carried : dict of str to ndarray
-        What deforms with the points, by attribute: empty at rest, without harmonics if the result is quick.
-    state : State
-        SETTLED or QUICK.
-    converged : bool
-        Whether the rotations converged.
-    """
-
-    points: np.ndarray
-    displacement: np.ndarray
-    carried: dict
-    state: State
-    converged: bool
+    points: np.ndarray  # (n, 3), what the next step starts from
+    displacement: np.ndarray  # (n, 3), in local space
+    carried: dict  # what deforms with the points, by attribute: empty at rest, without harmonics if the result is quick
+    state: State  # SETTLED or QUICK
+    converged: bool  # whether the rotations converged
 
 
 class Follower:

@@ -20,62 +20,30 @@ from .pose import Pose, is_there
 
 @dataclass(frozen=True)
 class Constraints:
-    """Constrained points: handles and anchors.
+    """Constrained points: handles and anchors."""
 
-    Attributes
-    ----------
-    names : list of str
-        The groups of the handles.
-    moved, owner : ndarray, (h,) int
-        The points that are moved, and for each the number of its group.
-    kept : ndarray, (a,) int
-        The points that stay.
-    strength : ndarray, (h + a,)
-        Their weights in their groups.
-    checksum : str
-        Of all of these.
-    """
-
-    names: list
+    names: list  # of str, the groups of the handles
+    # (h,) int, the points that are moved, and for each the number of its group
     moved: np.ndarray
     owner: np.ndarray
-    kept: np.ndarray
-    strength: np.ndarray
-    checksum: str
+    kept: np.ndarray  # (a,) int, the points that stay
+    strength: np.ndarray  # (h + a,), their weights in their groups
+    checksum: str  # of all of these
 
 
 @dataclass(frozen=True)
 class Binding:
-    """The binding of an object, read from it once.
+    """The binding of an object, read from it once."""
 
-    Attributes
-    ----------
-    rest : ndarray, (n, 3) float32
-        Points at rest in local space.
-    matrix : ndarray, (3, 3)
-        From local space to world lengths, when it was bound.
-    constraints : Constraints or None
-        None where the operator is needed to choose them.
-    splats : Splats or None
-        At rest in local space, if the points are splats.
-    rotation_aware : bool
-    softness : float or None
-        Factor of the weights of constraints; None for hard ones.
-    options : LaplacianOptions
-    boundary : ndarray, (n,) bool, or None
-    leave_out_floaters : bool
-        Whether floaters are excluded from the surface.
-    """
-
-    rest: np.ndarray
-    matrix: np.ndarray
-    constraints: Constraints | None
-    splats: "core.splats.Splats | None"
+    rest: np.ndarray  # (n, 3) float32, points at rest in local space
+    matrix: np.ndarray  # (3, 3), from local space to world lengths, when it was bound
+    constraints: Constraints | None  # None where the operator is needed to choose them
+    splats: "core.splats.Splats | None"  # at rest in local space, if the points are splats
     rotation_aware: bool
-    softness: float | None
+    softness: float | None  # factor of the weights of constraints; None for hard ones
     options: LaplacianOptions
-    boundary: np.ndarray | None
-    leave_out_floaters: bool
+    boundary: np.ndarray | None  # (n,) bool
+    leave_out_floaters: bool  # whether floaters are excluded from the surface
 
     def laplacian(self, progress) -> "core.LaplaceBeltrami":
         """Return the operator of the points at rest, in lengths of the world."""
@@ -153,21 +121,11 @@ def groups_checksum(names, weighted) -> str:
 
 @dataclass(frozen=True)
 class HandlePose(Pose):
-    """A pose of the handles.
+    """A pose of the handles."""
 
-    Attributes
-    ----------
-    changes : dict of str to ndarray, (4, 4)
-        Transforms of groups by their empties since they were bound, in local space.
-    edited : ndarray, (n, 3), or None
-        Positions in local space, where some handles are moved in Edit Mode.
-    steps : int
-        Maximum number of a settled result.
-    """
-
-    changes: dict
-    edited: np.ndarray | None
-    steps: int
+    changes: dict  # (4, 4) each, transforms of groups by their empties since they were bound, in local space
+    edited: np.ndarray | None  # (n, 3), positions in local space, where some handles are moved in Edit Mode
+    steps: int  # maximum number of a settled result
 
 
 def handled_object(obj, scene):

@@ -32,41 +32,21 @@ _TICK = 0.05  # seconds between two checks of a thread
 
 @dataclass
 class _Thread:
-    """A thread that settles an object, for the timer to look at.
-
-    Attributes
-    ----------
-    work : Job
-    pose : Pose
-        The pose that it works for.
-    prepares : bool
-        Whether it may make factors first.
-    """
+    """A thread that settles an object, for the timer to look at."""
 
     work: Job
-    pose: Pose
-    prepares: bool
+    pose: Pose  # the pose that it works for
+    prepares: bool  # whether it may make factors first
 
 
 @dataclass
 class _Followed:
-    """What is kept in memory of a bound object.
-
-    Attributes
-    ----------
-    thread : _Thread or None
-    due : float
-        When to settle what was updated quickly.
-    trouble : str
-        The error of the last update; empty without one.
-    troubled : ndarray or None
-        The numbers of the pose that caused it.
-    """
+    """What is kept in memory of a bound object."""
 
     thread: _Thread | None = None
-    due: float = 0.0
-    trouble: str = ""
-    troubled: np.ndarray | None = None
+    due: float = 0.0  # when to settle what was updated quickly
+    trouble: str = ""  # the error of the last update; empty without one
+    troubled: np.ndarray | None = None  # the numbers of the pose that caused it
 
 
 class _UpdateLock:

@@ -31,18 +31,10 @@ class State(Enum):
 
 @dataclass(frozen=True)
 class Pose:
-    """What displacements depend on while the binding is valid.
+    """What displacements depend on while the binding is valid."""
 
-    Attributes
-    ----------
-    key : tuple
-        What the follower of the object depends on, see `Kind.key`.
-    numbers : ndarray
-        Its identity, kept in the file: two checksums and all transforms.
-    """
-
-    key: tuple
-    numbers: np.ndarray
+    key: tuple  # what the follower of the object depends on, see `Kind.key`
+    numbers: np.ndarray  # its identity, kept in the file: two checksums and all transforms
 
     def is_same(self, numbers) -> bool:
         """Whether another pose, given by its numbers or None, is the same up to rounding."""

@@ -9,17 +9,10 @@ from ...core import PointCloudError
 
 
 class Box(NamedTuple):
-    """A box, possibly turned.
+    """A box, possibly turned."""
 
-    Attributes
-    ----------
-    center : ndarray, (3,)
-    edges : ndarray, (3, 3)
-        Columns from the center to the middles of three faces.
-    """
-
-    center: np.ndarray
-    edges: np.ndarray
+    center: np.ndarray  # (3,)
+    edges: np.ndarray  # (3, 3), columns from the center to the middles of three faces
 
     @property
     def bounds(self):

@@ -23,19 +23,10 @@ from .splats import HARMONIC, ROTATION, SCALE, harmonic_names, has_splats, shown
 
 
 class Carried(NamedTuple):
-    """An attribute that a deformation changes.
+    """An attribute that a deformation changes."""
 
-    Attributes
-    ----------
-    name : str
-        Of the attribute at rest, which the modifier replaces where the deformation is shown.
-    moved : str
-        Of the attribute that holds it after the deformation; missing at rest.
-    data_type : str
-    """
-
-    name: str
-    moved: str
+    name: str  # of the attribute at rest, which the modifier replaces where the deformation is shown
+    moved: str  # of the attribute that holds it after the deformation; missing at rest
     data_type: str
 
 

@@ -26,22 +26,13 @@ _MOST = 50  # objects that are remembered
 
 
 class Members(NamedTuple):
-    """The points of a group, and which of them have a weight above zero.
+    """The points of a group, and which of them have a weight above zero."""
 
-    Attributes
-    ----------
-    count : int
-        Number of points, those of weight zero included.
-    checksum, weighted : int
-        Checksum of the points with a weight above zero, and one of their weights.
-    bits : bytes
-        One for each point, packed: whether its weight is above zero.
-    """
-
-    count: int = 0
+    count: int = 0  # number of points, those of weight zero included
+    # Checksum of the points with a weight above zero, and one of their weights
     checksum: int = 0
     weighted: int = 0
-    bits: bytes = b""
+    bits: bytes = b""  # one for each point, packed: whether its weight is above zero
 
     @property
     def rows(self):

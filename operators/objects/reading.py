@@ -71,29 +71,16 @@ def obstacle(obj, modes=("OBJECT",)) -> str:
 
 @dataclass(frozen=True)
 class Reading:
-    """Points of an object.
+    """Points of an object."""
 
-    Attributes
-    ----------
-    points : ndarray, (n, 3) float64
-        Positions with the object's scale, rotation and shear, without its location, to keep numbers small.
-    matrix : ndarray, (3, 3) float64
-        The linear part of the object's matrix: points = local positions @ matrix.T.
-    boundary : ndarray, (n,) bool, or None
-        Boundary points, where the user's vertex group names them.
-    notices : list of str
-        Notices about how the object was read.
-    orientation : ndarray, (n, 3) float64, or None
-        Vectors that orient the normals, where Orient Normals or the user chose a side.
-    splats : Splats or None
-        The splats of the points in local space, without harmonics, if floaters are to be left out.
-    """
-
+    # (n, 3) float64, positions with the object's scale, rotation and shear, without its location, to keep numbers small
     points: np.ndarray
-    matrix: np.ndarray
-    boundary: np.ndarray | None = None
-    notices: list = field(default_factory=list)
+    matrix: np.ndarray  # (3, 3) float64, the linear part of the object's matrix: points = local positions @ matrix.T
+    boundary: np.ndarray | None = None  # (n,) bool, boundary points, where the user's vertex group names them
+    notices: list = field(default_factory=list)  # of str, notices about how the object was read
+    # (n, 3) float64, vectors that orient the normals, where Orient Normals or the user chose a side
     orientation: np.ndarray | None = None
+    # The splats of the points in local space, without harmonics, if floaters are to be left out
     splats: "core.splats.Splats | None" = None
 
     def local(self, vectors):

@@ -15,49 +15,23 @@ _STILL = 1e-6  # of the extent of the points, and of a turn: less is a pose at r
 
 @dataclass(frozen=True)
 class BoneBinding:
-    """The binding of an object to bones, read from it once.
+    """The binding of an object to bones, read from it once."""
 
-    Attributes
-    ----------
-    rest : ndarray, (n, 3) float32
-        Points at rest in local space.
-    splats : Splats or None
-        At rest in local space, if the points are splats.
-    bones : ndarray, (n, k) int
-        Which bones each point follows.
-    weights : ndarray, (n, k)
-        How much; their sums are one, or zero where a point follows none.
-    count : int
-        How many bones there are.
-    places : bool
-        Whether the points are moved; else another modifier does that, and only what they carry is turned.
-    """
-
-    rest: np.ndarray
-    splats: "core.splats.Splats | None"
-    bones: np.ndarray
-    weights: np.ndarray
-    count: int
-    places: bool
+    rest: np.ndarray  # (n, 3) float32, points at rest in local space
+    splats: "core.splats.Splats | None"  # at rest in local space, if the points are splats
+    bones: np.ndarray  # (n, k) int, which bones each point follows
+    weights: np.ndarray  # (n, k), how much; their sums are one, or zero where a point follows none
+    count: int  # how many bones there are
+    places: bool  # whether the points are moved; else another modifier does that, and only what they carry is turned
 
 
 @dataclass(frozen=True)
 class BonePose(Pose):
-    """A pose of the bones.
+    """A pose of the bones."""
 
-    Attributes
-    ----------
-    changes : ndarray, (b, 3, 4)
-        From rest to pose of each bone, in the armature's space.
-    relative : ndarray, (4, 4)
-        From the space of the points to that of the armature.
-    preserve_volume : bool
-        Whether dual quaternions are blended.
-    """
-
-    changes: np.ndarray
-    relative: np.ndarray
-    preserve_volume: bool
+    changes: np.ndarray  # (b, 3, 4), from rest to pose of each bone, in the armature's space
+    relative: np.ndarray  # (4, 4), from the space of the points to that of the armature
+    preserve_volume: bool  # whether dual quaternions are blended
 
 
 class BoneFollower:

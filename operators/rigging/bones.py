@@ -9,15 +9,10 @@ from ...core import PointCloudError
 
 
 class Bones(NamedTuple):
-    """The deforming bones of an armature at rest, in the armature's space.
+    """The deforming bones of an armature at rest, in the armature's space."""
 
-    Attributes
-    ----------
-    names : list of str
-    heads, tails : ndarray, (b, 3)
-    """
-
-    names: list
+    names: list  # of str
+    # (b, 3) each
     heads: np.ndarray
     tails: np.ndarray
 
@@ -69,24 +64,12 @@ def ends_seen_from(obj, armature, bones):
 
 
 class Envelopes(NamedTuple):
-    """How bones limit weights, as Blender's Armature modifier does.
+    """How bones limit weights, as Blender's Armature modifier does."""
 
-    Attributes
-    ----------
-    deforms : ndarray, (b,) bool
-        Whether a bone is followed at all.
-    multiplies : ndarray, (b,) bool
-        Whether weights are multiplied by its envelope.
-    ends : ndarray, (2, b, 3)
-        Heads and tails at rest in the armature's space.
-    sizes : ndarray, (3, b)
-        Radii there, and distances.
-    """
-
-    deforms: np.ndarray
-    multiplies: np.ndarray
-    ends: np.ndarray
-    sizes: np.ndarray
+    deforms: np.ndarray  # (b,) bool, whether a bone is followed at all
+    multiplies: np.ndarray  # (b,) bool, whether weights are multiplied by its envelope
+    ends: np.ndarray  # (2, b, 3), heads and tails at rest in the armature's space
+    sizes: np.ndarray  # (3, b), radii there, and distances
 
     @property
     def text(self) -> bytes:

@@ -125,26 +125,13 @@ def followers_of(armature) -> list:
 
 
 class Bound(NamedTuple):
-    """What binding an object to an armature writes.
+    """What binding an object to an armature writes."""
 
-    Attributes
-    ----------
-    rest : ndarray, (n, 3) float32
-        Points at rest in local space.
-    matrix : ndarray, (3, 3)
-        From local space to world lengths.
-    names : list of str
-        The bones that the object has weights of.
-    renamed : dict of str to str
-        New names of bones by those of the weights.
-    notices : list of str
-    """
-
-    rest: np.ndarray
-    matrix: np.ndarray
-    names: list
-    renamed: dict
-    notices: list
+    rest: np.ndarray  # (n, 3) float32, points at rest in local space
+    matrix: np.ndarray  # (3, 3), from local space to world lengths
+    names: list  # of str, the bones that the object has weights of
+    renamed: dict  # new names of bones by those of the weights
+    notices: list  # of str
 
 
 def bind(obj, armature) -> list:

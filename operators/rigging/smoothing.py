@@ -23,22 +23,13 @@ _ONE = 1e-3  # how far from one the sum of normalized weights may be
 
 
 class _Part(NamedTuple):
-    """Groups that are smoothed in one go.
+    """Groups that are smoothed in one go."""
 
-    Attributes
-    ----------
-    columns : ndarray, (k,) int
-        Among all groups of the object.
-    smoothed, locked : ndarray, (k,) bool
-        Which are to change by themselves, and which not at all; the others make room.
-    bound : bool
-        Whether the weights of a point belong together, as those of bones.
-    """
-
-    columns: np.ndarray
+    columns: np.ndarray  # (k,) int, among all groups of the object
+    # (k,) bool, which are to change by themselves, and which not at all; the others make room
     smoothed: np.ndarray
     locked: np.ndarray
-    bound: bool
+    bound: bool  # whether the weights of a point belong together, as those of bones
 
 
 class SmoothWeights(Tool):

@@ -21,23 +21,12 @@ _BUILDING = 0.7  # share of the time that the operators of all objects take
 
 
 class Source(NamedTuple):
-    """An object that others take values from.
-
-    Attributes
-    ----------
-    name : str
-    operator : callable
-        From a progress callback to its operator.
-    place : ndarray, (3,)
-        From its points as read to coordinates that all objects share.
-    values : object
-        What the tool has read of it.
-    """
+    """An object that others take values from."""
 
     name: str
-    operator: Any
-    place: np.ndarray
-    values: Any
+    operator: Any  # from a progress callback to its operator
+    place: np.ndarray  # (3,), from its points as read to coordinates that all objects share
+    values: Any  # what the tool has read of it
 
 
 class Transfer(Tool):

@@ -20,21 +20,11 @@ _OWN = ("position", "radius")  # what Blender itself keeps at points, beside nam
 
 
 class _Values(NamedTuple):
-    """An attribute of the points of an object.
+    """An attribute of the points of an object."""
 
-    Attributes
-    ----------
-    data_type : str
-        With which it is written.
-    smooth : bool
-        Whether it may be averaged.
-    array : ndarray, (n, k) or (n,)
-        Vectors in world space.
-    """
-
-    data_type: str
-    smooth: bool
-    array: np.ndarray
+    data_type: str  # with which it is written
+    smooth: bool  # whether it may be averaged
+    array: np.ndarray  # (n, k) or (n,), vectors in world space
 
 
 class _Attributes(NamedTuple):

@@ -17,23 +17,12 @@ from .weights import MOST, has_weights, named, read_weights, takes_groups, weigh
 
 
 class Weights(NamedTuple):
-    """The weights of an object.
+    """The weights of an object."""
 
-    Attributes
-    ----------
-    names : list of str
-        Of all groups.
-    table : ndarray, (n, b)
-    bones : list of str
-        Those of deforming bones; all of a point cloud; none without an armature.
-    active : str
-        The active group, empty if there is none.
-    """
-
-    names: list
-    table: np.ndarray
-    bones: list
-    active: str
+    names: list  # of str, of all groups
+    table: np.ndarray  # (n, b)
+    bones: list  # of str, those of deforming bones; all of a point cloud; none without an armature
+    active: str  # the active group, empty if there is none
 
     def columns(self, names):
         """Return the weights of these names, (n, k); zero for those that there are not."""

@@ -15,26 +15,13 @@ _STEPS = (1, 2, 5)  # times a power of ten: sizes of subsets, so that a little m
 
 
 class Measured(NamedTuple):
-    """The operator of an object's points, or of a subset of them.
-
-    Attributes
-    ----------
-    built : Built
-    subset : ndarray, (k,) int
-        Rows of the points that it is built on; none for all.
-    measures : dict
-        Values at all points, in lengths and axes of the world, by the names of attributes.
-    prolongation : Prolongation or None
-        From the subset to all.
-    left_out : ndarray, (m,) int
-        Splats that are left out.
-    """
+    """The operator of an object's points, or of a subset of them."""
 
     built: Built
-    subset: np.ndarray
-    measures: dict
-    prolongation: "core.clean.Prolongation | None"
-    left_out: np.ndarray
+    subset: np.ndarray  # (k,) int, rows of the points that it is built on; none for all
+    measures: dict  # values at all points, in lengths and axes of the world, by the names of attributes
+    prolongation: "core.clean.Prolongation | None"  # from the subset to all
+    left_out: np.ndarray  # (m,) int, splats that are left out
 
     def carried(self, vectors):
         """Transfer functions from the points of the operator, (k, m), to all points, (n, m)."""

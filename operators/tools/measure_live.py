@@ -35,39 +35,19 @@ _NOTHING = "No points are selected"
 
 @dataclass
 class _Followed:
-    """The object whose selection is measured, without a reference to it, which undo would invalidate.
+    """The object whose selection is measured, without a reference to it, which undo would invalidate."""
 
-    Attributes
-    ----------
-    uid : int
-        Of the object.
-    laplacian : LaplaceBeltrami
-    state : tuple
-        What the Laplacian depends on: number and checksum of points, scale, settings.
-    seen : tuple or None
-        The selection and the plane that the figures are of, or will be.
-    work : Job or None
-        The thread that measures them, or the volume of the surface; its result is what to do with that.
-    due : float
-        When to look at the selection; infinite if nothing has changed.
-    moved : bool
-        Whether points may have been moved since they were looked at.
-    figures : list of Figure
-    notices : list of str
-    whole : tuple of both, or None
-        Of the surface as a whole: empty if it is open, None until it is measured.
-    """
-
-    uid: int
+    uid: int  # of the object
     laplacian: "core.LaplaceBeltrami"
-    state: tuple
-    seen: tuple | None = None
+    state: tuple  # what the Laplacian depends on: number and checksum of points, scale, settings
+    seen: tuple | None = None  # the selection and the plane that the figures are of, or will be
+    # The thread that measures them, or the volume of the surface; its result is what to do with that
     work: Job | None = None
-    due: float = 0.0
-    moved: bool = True
-    figures: list = field(default_factory=list)
-    notices: list = field(default_factory=list)
-    whole: tuple | None = None
+    due: float = 0.0  # when to look at the selection; infinite if nothing has changed
+    moved: bool = True  # whether points may have been moved since they were looked at
+    figures: list = field(default_factory=list)  # of Figure
+    notices: list = field(default_factory=list)  # of str
+    whole: tuple | None = None  # of the surface as a whole: empty if it is open, None until it is measured
 
 
 _followed = []  # at most one

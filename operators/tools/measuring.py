@@ -22,44 +22,27 @@ from .select import SelectionOperator, analyzed, selected, selected_ends
 
 
 class Figure(NamedTuple):
-    """A measure, in world lengths.
-
-    Attributes
-    ----------
-    title : str
-    values : tuple of float
-    uncertainty : float
-        Within which the true value is expected; 0 if that is not known.
-    power : int
-        Of length.
-    """
+    """A measure, in world lengths."""
 
     title: str
-    values: tuple
-    uncertainty: float
-    power: int
+    values: tuple  # of float
+    uncertainty: float  # within which the true value is expected; 0 if that is not known
+    power: int  # of length
 
 
 class Measured(NamedTuple):
-    """Measures of selected points.
-
-    Attributes
-    ----------
-    area, boundary, size, mean_curvature, largest_curvature : Figure
-    above, below, net : Figure or None
-        Volumes on both sides of a plane, and their difference where the plane was chosen, so that it has a sign.
-    notices : list of str
-    """
+    """Measures of selected points."""
 
     area: Figure
     boundary: Figure
     size: Figure
     mean_curvature: Figure
     largest_curvature: Figure
+    # Volumes on both sides of a plane, and their difference where the plane was chosen, so that it has a sign
     above: Figure | None
     below: Figure | None
     net: Figure | None
-    notices: list
+    notices: list  # of str
 
     @property
     def figures(self) -> list:

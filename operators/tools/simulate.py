@@ -27,24 +27,14 @@ _MEGABYTE = 1 << 20
 
 
 class Simulated(NamedTuple):
-    """What was simulated.
-
-    Attributes
-    ----------
-    motion : _Frames or InModes
-    frames, step : int
-        Frames of the scene, and how many are from one on disk to the next.
-    reached : ndarray, (n,) bool
-        Points of components with sources.
-    normals : ndarray, (n, 3)
-        In local space.
-    """
+    """What was simulated."""
 
     motion: "_Frames | InModes"
+    # Frames of the scene, and how many are from one on disk to the next
     frames: int
     step: int
-    reached: np.ndarray
-    normals: np.ndarray
+    reached: np.ndarray  # (n,) bool, points of components with sources
+    normals: np.ndarray  # (n, 3), in local space
 
 
 class _Frames(NamedTuple):
