@@ -38,23 +38,15 @@ class Kind(NamedTuple):
     motion, which return another owner; `write` for a cloud with results, `add_mesh`, `add_curves` and `add_profile`,
     which change the open file; `save`, which writes it; `place`, `plane` and `curve`, which return what other objects
     are, by name, in the coordinates of the cloud.
-
-    Attributes
-    ----------
-    add_options : callable
-        Of a parser: adds the options for what is read.
-    read : callable
-        Of a path, the name of an object or "", the option for it, and the arguments of a command line; opens the file.
-    own : callable
-        Of a name, what another file holds, and arguments: makes that an object of an empty file, and returns it.
-    close : callable
-        Of the vertices and faces of a mesh: returns arrays of faces (m, k) without openings, and how many edges are
-        left of one face.
     """
 
-    add_options: Callable[[ArgumentParser], None]
+    add_options: Callable[[ArgumentParser], None]  # of a parser: adds the options for what is read
+    # Of a path, the name of an object or "", the option for it, and the arguments of a command line; opens the file
     read: Callable[[Path, str, str, Namespace], Given]
+    # Of a name, what another file holds, and arguments: makes that an object of an empty file, and returns it
     own: Callable[[str, Given, Namespace], Given]
+    # Of the vertices and faces of a mesh: returns arrays of faces (m, k) without openings, and how many edges are left
+    # of one face
     close: Callable[[Array, Array], tuple[list[Array], int]]
 
 
@@ -125,21 +117,9 @@ def positions(given: Given) -> Array:
 
 
 class Cloud:
-    """Points of a file, in double precision.
+    """Points of a file, (n, 3) in double precision, less a `place`, (3,), which keeps numbers small.
 
-    Parameters
-    ----------
-    path : pathlib.Path
-    given : PointTable or Splats
-    floaters : bool
-        Whether floaters among splats are left out of operators.
-
-    Attributes
-    ----------
-    points : ndarray, (n, 3)
-        Less `place`, (3,), which keeps numbers small.
-    out : ndarray, (m,) int
-        Splats that operators leave out.
+    Operators leave the splats `out`, (m,), floaters if these are not wanted.
     """
 
     def __init__(self, path: Path, given: Given, floaters: bool = True) -> None:

@@ -57,13 +57,7 @@ def check_report(parser: ArgumentParser, arguments: Namespace) -> None:
 
 
 class Records:
-    """The records of a command line.
-
-    Parameters
-    ----------
-    verb : Verb
-    arguments : argparse.Namespace
-    """
+    """The records of a command line."""
 
     def __init__(self, verb: Verb, arguments: Namespace) -> None:
         self._verb, self._arguments = verb, arguments

@@ -13,21 +13,10 @@ if TYPE_CHECKING:
 
 
 class StageTimes:
-    """Progress callback for core that keeps the seconds of each stage.
+    """Progress callback for core that keeps the seconds of each stage, complete after the ``with`` block.
 
-    Parameters
-    ----------
-    progress : callable, optional
-        Another one, which is called too.
-
-    Attributes
-    ----------
-    seconds : dict of str to float
-        Seconds by stage, complete after the ``with`` block.
-    stage : str
-        The last one that was started.
-    fraction : float
-        Its progress, or that of the whole.
+    Another one may be called, too. The stage is the last one that was started, the fraction its progress, or that of
+    the whole.
     """
 
     def __init__(self, progress: Callable[[str, float], None] | None = None) -> None:
@@ -63,12 +52,7 @@ class StageTimes:
 class ToldStages(StageTimes):
     """The same, with a line for each stage on standard error, so that standard output holds results only.
 
-    Parameters
-    ----------
-    label : str
-        What is computed.
-    each : float
-        Share of the work after which a stage gets a further line.
+    The label says what is computed; after a share of the work a stage gets a further line.
     """
 
     def __init__(self, label: str, each: float = math.inf) -> None:

@@ -54,27 +54,10 @@ _PACKAGE = "meshfree-laplacian[scale]"
 class Sources:
     """The points of some files, read in pieces, as often as they are asked for.
 
-    Parameters
-    ----------
-    paths : sequence of pathlib.Path
-    las : LasChoices
-    columns : str
-        Names of those of files of text; empty to find them.
-    bounds : sequence of float, optional
-        Lowest and highest corner of the box that is read, six numbers.
-    level : int, optional
-        The last level of detail that is read; files that have none are broken then.
-
-    Attributes
-    ----------
-    notices : list of str
-        Of the last time that they were read.
-    full : float
-        The number of a full color in them; zero if they have none.
-    las : LasForm or None
-        What those of LAS state besides.
-    broken : dict of pathlib.Path to PointCloudError
-        The files that cannot be read, and why. They are left out.
+    Columns are the names of those of files of text; empty to find them. Bounds are the lowest and highest corner of the
+    box that is read, six numbers, the level is the last one of detail; files that have none are broken then. `broken`
+    has the files that cannot be read, and are left out, and why; `notices` are of the last time that they were read;
+    `full` is the number of a full color, zero if they have none; `las` is what those of LAS state besides.
     """
 
     def __init__(

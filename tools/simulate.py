@@ -110,16 +110,7 @@ def chosen(own: Any, sources: Array, count: int, step: int = 1) -> Chosen:
 class Watched:
     """Frames as they are made, with progress, and what is known of their values when all have passed.
 
-    Parameters
-    ----------
-    laplacian : LaplaceBeltrami
-    chosen : Chosen
-    progress : callable
-
-    Attributes
-    ----------
-    distance : float
-        How far the motion goes, or the size of a pattern.
+    The distance is how far the motion goes, or the size of a pattern.
     """
 
     def __init__(self, laplacian: Laplacian, chosen: Chosen, progress: Progress) -> None:

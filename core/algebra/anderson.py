@@ -10,15 +10,9 @@ _MEMORY = 5  # previous steps that the next one is extrapolated from
 class Anderson:
     """Accelerates a fixed-point iteration: half of the steps or fewer, to the same fixed point.
 
-    Parameters
-    ----------
-    smallest : float
-        Regularization of the least squares, relative to the trace of their matrix: smaller differences of residuals are
-        rounding error, or due to the map's not being linear.
-
-    References
-    ----------
-    Walker, Ni. Anderson acceleration for fixed-point iterations. SIAM J. Numer. Anal. 49, 2011.
+    Smaller differences of residuals than the smallest, a regularization of the least squares relative to the trace of
+    their matrix, are rounding error, or due to the map's not being linear. (Walker, Ni. Anderson acceleration for
+    fixed-point iterations. SIAM J. Numer. Anal. 49, 2011.)
     """
 
     def __init__(self, smallest: float) -> None:

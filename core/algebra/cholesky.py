@@ -122,13 +122,7 @@ def _add(front: Floats, place: Ints, left: Floats) -> None:
 
 
 class Factors:
-    """The inverse of the lower factor of a matrix, as a product over dense parts.
-
-    Parameters
-    ----------
-    count : int
-        Unknowns.
-    """
+    """The inverse of the lower factor of a matrix of so many unknowns, as a product over dense parts."""
 
     def __init__(self, count: int) -> None:
         self._count = count

@@ -18,15 +18,9 @@ Result = TypeVar("Result")
 
 
 class Rows:
-    """A sparse matrix whose products are taken by parts of its rows, on all cores.
+    """A sparse matrix, not copied, whose products are taken by parts of its rows, on all cores.
 
-    Parameters
-    ----------
-    matrix : csr_array, (n, m)
-        Not copied.
-    pool : ThreadPoolExecutor
-    report : callable
-        Called without arguments after each part; may raise `Cancelled`.
+    `report` is called without arguments after each part; it may raise `Cancelled`.
     """
 
     def __init__(self, matrix: sparse.csr_array, pool: ThreadPoolExecutor, report: Report) -> None:

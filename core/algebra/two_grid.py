@@ -23,29 +23,15 @@ _STEPS = 100
 class TwoGrid:
     """Solves a step of heat flow by the connection Laplacian: by smoothing, and by a coarse version that is factored.
 
-    Parameters
-    ----------
-    matrix : csr_array, (n, n) complex
-        Hermitian positive definite: a mass, and the connection Laplacian by a factor.
-    mass : ndarray, (n,)
-    points : ndarray, (n, 3)
-        Where the unknowns are.
-    report : callable
-        Called as ``report(stage, fraction)``; may raise `Cancelled`.
-
-    Raises
-    ------
-    SolverError
-        The matrix is not positive definite.
-
-    Notes
-    -----
     Heat falls off by many powers of ten, and its direction is wanted where it is faintest, too. Conjugate gradients
     reduce the sum of all errors, in which these do not count. A coarse version that is solved directly falls off nearly
     as the fine one does, so that each step reduces the error relative to the value of each point.
 
     The coarse unknowns are aggregates of a few tens of points, each with the direction of its root, rotated as the
     matrix rotates it from there to the others, and smoothed once (Vanek, Mandel and Brezina 1996).
+
+    The matrix, a mass, (n,), and the connection Laplacian by a factor, is Hermitian; if it is not positive definite,
+    `SolverError` is raised. Unknowns are at `points`, (n, 3). `report` may raise `Cancelled`.
     """
 
     def __init__(self, matrix: sparse.csr_array, mass: Floats, points: Floats, report: Progress) -> None:

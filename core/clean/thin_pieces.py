@@ -126,17 +126,7 @@ def _taken(pieces: Sequence[Piece], chosen: Ints) -> list[Piece]:
 class _Grid:
     """Cells whose edges are a power of two, the finest of which no more than some number have points.
 
-    Parameters
-    ----------
-    most : int
-        Cells with points.
-    report : callable
-        Called at each trial.
-
-    Attributes
-    ----------
-    power : int or None
-        Of two; None before `coarsen`.
+    The power is None before `coarsen`. `report` is called at each trial.
     """
 
     def __init__(self, most: int, report: Report) -> None:

@@ -13,21 +13,10 @@ _ROUNDS = 3  # of Newton's iteration for the foot
 
 
 class BoundaryCurve:
-    """Parabolas through each point of a boundary and its two neighbors along it.
+    """Parabolas through each point of a boundary and its two neighbors along it, of points in any order [L].
 
-    Parameters
-    ----------
-    points : ndarray, (k, 3)
-        Points of the boundary in any order, at least two different ones [L].
-
-    Attributes
-    ----------
-    points : ndarray, (m, 3)
-        The different ones among them.
-    first : ndarray, (m,) int
-        Where each was first given.
-    rough : bool
-        The points are scattered about a curve, as those found at the boundary of a random cloud, instead of along it.
+    At least two are different ones: `points`, (m, 3), each first given at `first`, (m,). They are `rough` if scattered
+    about a curve, as those found at the boundary of a random cloud, instead of along it.
     """
 
     def __init__(self, points: Floats) -> None:

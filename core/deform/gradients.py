@@ -16,17 +16,7 @@ _ROUND = 0.05  # share of the smaller extent of a neighborhood, squared, in both
 
 
 class DeformationGradients:
-    """Finds deformation gradients of a surface that is moved again and again; see `deformation_gradients`.
-
-    Parameters
-    ----------
-    laplacian : LaplaceBeltrami
-        Of the points at rest.
-
-    See Also
-    --------
-    deformation_gradients : For one deformation.
-    """
+    """Finds deformation gradients of a surface that is moved again and again; see `deformation_gradients`."""
 
     def __init__(self, laplacian: LaplaceBeltrami) -> None:
         self._count = len(laplacian.points)

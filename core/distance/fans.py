@@ -22,18 +22,10 @@ _BLOCK = 1 << 15  # pairs worked on at one time, so that they stay in the cache
 class Fans:
     """Triangles of every point and two neighbors next to each other in direction, in geodesic polar coordinates.
 
-    Where points lie in rows, neighbors are in few directions, and every path along pairs zigzags. A front that passes
-    a triangle comes from one place in its plane, which follows from when it passed two corners; so it is as exact in
-    all directions, and exact in the plane.
-
-    Parameters
-    ----------
-    laplacian : LaplaceBeltrami
-        Of n points.
-    lengths : csr_array, (n, n)
-        Symmetric: of the arcs between neighbors [L].
-    report : callable
-        Called now and then; may raise `Cancelled`.
+    Where points lie in rows, neighbors are in few directions, and every path along pairs zigzags. A front that passes a
+    triangle comes from one place in its plane, which follows from when it passed two corners; so it is as exact in all
+    directions, and exact in the plane. Lengths, (n, n), are those of the arcs between neighbors [L], symmetric.
+    `report` is called now and then; it may raise `Cancelled`.
     """
 
     def __init__(self, laplacian: LaplaceBeltrami, lengths: sparse.csr_array, report: Callable[[], None]) -> None:

@@ -152,14 +152,7 @@ def _checked(laplacian: LaplaceBeltrami, start: Any, end: Any) -> tuple[int, int
 
 
 class _Path:
-    """A polygon on the surface with fixed ends, which is straightened.
-
-    Parameters
-    ----------
-    laplacian : LaplaceBeltrami
-    corners : ndarray, (c,) int
-        Points of a path that is nearly the shortest.
-    """
+    """A polygon on the surface with fixed ends, which is straightened: through points of a path nearly the shortest."""
 
     def __init__(self, laplacian: LaplaceBeltrami, corners: Ints) -> None:
         given = laplacian.surface_points[corners]

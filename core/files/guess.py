@@ -32,13 +32,7 @@ def are_triangles(rows: Floats) -> bool:
 
 
 class Guess:
-    """Kinds of columns that a file does not name, gathered from their values, as many rows at once as one likes.
-
-    Parameters
-    ----------
-    width : int
-        How many columns.
-    """
+    """Kinds of columns that a file does not name, gathered from their values, as many rows at once as one likes."""
 
     def __init__(self, width: int) -> None:
         self._triples = [_Triple() for _ in range(min(width, _MOST) - 2)]
@@ -106,13 +100,7 @@ class Guess:
 class _Triple:
     """What the values of three columns are.
 
-    Attributes
-    ----------
-    count : int
-        Rows, of which those that were looked at in full are counted.
-    largest : float
-    spread : float
-        By how much the three differ, summed over the rows.
+    The rows that were looked at in full are counted; the spread is by how much the three differ, summed over them.
     """
 
     def __init__(self) -> None:

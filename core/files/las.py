@@ -231,12 +231,7 @@ def las_pieces(
 
 
 class Tally:
-    """Selects the points that are read, and counts those of each class.
-
-    Parameters
-    ----------
-    choices : LasChoices
-    """
+    """Selects the points that are read, and counts those of each class."""
 
     def __init__(self, choices: LasChoices) -> None:
         self.choices = choices

@@ -227,15 +227,7 @@ def without_missed(table: PointTable, path: Path) -> PointTable:
 
 
 class Missed:
-    """Counts points without valid coordinates.
-
-    Attributes
-    ----------
-    count : int
-        Those looked at.
-    far : int
-        Those of them with finite ones.
-    """
+    """Counts points without valid coordinates: `count` those looked at, and `far` those of them with finite ones."""
 
     def __init__(self) -> None:
         self.count = self.far = 0

@@ -154,13 +154,7 @@ def part_means(laplacian: LaplaceBeltrami, values: ArrayLike, labels: ArrayLike 
 
 
 class _Labelled:
-    """The parts of a surface.
-
-    Attributes
-    ----------
-    labels : ndarray, (p,) int
-        In ascending order.
-    """
+    """The parts of a surface by their labels, (p,), in ascending order."""
 
     def __init__(self, laplacian: LaplaceBeltrami, labels: ArrayLike | None) -> None:
         component = laplacian.component

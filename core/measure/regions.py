@@ -494,17 +494,8 @@ class _Strip:
 class _Likelihood:
     """How likely parabolas are, by pairs of a parabola, in ascending order, and a point that is a member or not.
 
-    Parameters
-    ----------
-    row : ndarray, (p,) int
-        Of the parabola.
-    count : int
-        How many there are.
-    weight : ndarray, (p,)
-    t, n : ndarray, (p,)
-        Where the point is, along the line and across it.
-    sign : ndarray, (p,)
-        1 for members, -1 for others.
+    Of each pair, (p,), `row` is the parabola, t and n are where the point is, along the line and across it, and the
+    sign is 1 for members, -1 for others.
     """
 
     def __init__(self, row: Ints, count: int, weight: Floats, t: Floats, n: Floats, sign: Floats) -> None:

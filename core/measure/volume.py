@@ -130,17 +130,9 @@ def _volume(laplacian: LaplaceBeltrami, progress: Progress | None) -> EnclosedVo
 
 
 class _Skin:
-    """Triangles of a mesh.
+    """Triangles of a mesh, (t, 3), each of the component of the nearest point.
 
-    Attributes
-    ----------
-    vertices : ndarray, (v, 3)
-        From their middle on.
-    triangles : ndarray, (t, 3) int
-    component : ndarray, (t,) int
-        That of the nearest point.
-    edges : ndarray, (e, 2) int
-        Sides of quads, in their sense of rotation.
+    Vertices, (v, 3), are from their middle on; edges, (e, 2), are sides of quads, in their sense of rotation.
     """
 
     def __init__(self, surface: ImplicitSurface, mesh: SurfaceMesh, component: Ints) -> None:
@@ -185,17 +177,9 @@ class _Skin:
 
 
 class _Caps:
-    """Fans of triangles that close the openings of a mesh, each around the centre of its boundary.
+    """Fans of triangles, (e, 3, 3), that close the openings of a mesh, each around the centre of its boundary.
 
-    Attributes
-    ----------
-    component : ndarray, (k,) int
-        Of each opening.
-    triangles : ndarray, (e, 3, 3)
-        Corners of all fans.
-    component_of_triangles : ndarray, (e,) int
-    flat : ndarray, (k,)
-        Signed volume between each fan and the middle.
+    Openings, (k,), are of components, and `flat` is the signed volume between each fan and the middle.
     """
 
     def __init__(self, skin: _Skin) -> None:

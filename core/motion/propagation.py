@@ -40,19 +40,7 @@ _ENDLESS = 1e12  # ratio of step to highest frequency from which nothing but con
 class Propagator:
     """Steps in time of functions on the points that are not left out; the others stay.
 
-    Parameters
-    ----------
-    laplacian : LaplaceBeltrami
-        Of n points.
-    progress : callable, optional
-        Called as ``progress(stage, fraction)`` in the set-up; may raise `Cancelled`.
-
-    Attributes
-    ----------
-    count : int
-        All points, n.
-    order : ndarray, (m,) int
-        Those that are not left out, neighbors near in memory.
+    Of all points, `count`, those that are not left out are in the order, (m,), in which neighbors are near in memory.
     """
 
     def __init__(self, laplacian: LaplaceBeltrami, progress: Progress | None) -> None:

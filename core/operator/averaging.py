@@ -37,10 +37,6 @@ class Averages:
     of variance w along each axis, has the variance ``sigma^2 a / (8 pi w^3)``: that of the mean curvature, and that of
     half the difference of principal curvatures in both its components together. A quadric is such a Gaussian, as wide
     as its own scatter says; each average adds the second moment of its weights to w.
-
-    Parameters
-    ----------
-    laplacian : LaplaceBeltrami
     """
 
     def __init__(self, laplacian: LaplaceBeltrami) -> None:

@@ -120,10 +120,7 @@ def _trace(cloud: Cloud, weights: Floats, areas: Floats) -> Floats:
 class _Moments:
     """The moments of weights around every point, in units of those of the kernel.
 
-    Attributes
-    ----------
-    factor : ndarray, (p,)
-        By which each pair's weight was multiplied last.
+    `factor`, (p,), is by what each pair's weight was multiplied last.
     """
 
     def __init__(self, cloud: Cloud, distance: Floats, weights: Floats, unit: Floats, report: Report) -> None:

@@ -21,18 +21,10 @@ _BLOCK = 1 << 9
 class Inside:
     """The winding number of a surface around it: 1 inside a closed one, 0 outside, in between where it is open.
 
-    Parameters
-    ----------
-    laplacian : LaplaceBeltrami
-        Of n points, whose normals point outwards.
-    report : callable
-        Called between stages; may raise `Cancelled`.
-
-    Notes
-    -----
-    It is the function whose gradient is minus the normals, as a density on the surface, and hence solves Poisson's
-    equation (Kazhdan 2005). On a grid of two million cells, a bit wider than the points, the fast Fourier transform
-    does this at once, for as many points as there may be; a sheet is as thick as two cells then, or as the spacing.
+    It is the function whose gradient is minus the normals, which point outwards, as a density on the surface, and hence
+    solves Poisson's equation (Kazhdan 2005). On a grid of two million cells, a bit wider than the points, the fast
+    Fourier transform does this at once, for as many points as there may be; a sheet is as thick as two cells then, or
+    as the spacing. `report` is called between stages; it may raise `Cancelled`.
     """
 
     def __init__(self, laplacian: LaplaceBeltrami, report: Report = lambda: None) -> None:

@@ -182,18 +182,11 @@ class Skinner:
 
 
 class _Block:
-    """The weights of some of the points.
+    """The weights of some of the points, rows of a table, (m, b).
 
-    Attributes
-    ----------
-    rows : slice
-    table : sparse array, (m, b)
-    left : ndarray, (m,)
-        What the weights of a point leave to one, which does not move.
-    first : ndarray, (m,) int
-        The bone that each point follows most; the first one where it follows none.
-    pairs : ndarray, int
-        For each weight the number of that bone and of its own one, as of an entry of a table (b, b).
+    Of each point, `left` is what the weights leave to one, which does not move, and `first` the bone that it follows
+    most; the first one where it follows none. `pairs` is for each weight the number of that bone and of its own one, as
+    of an entry of a table (b, b).
     """
 
     def __init__(self, rows: slice, table: sparse.csr_array) -> None:

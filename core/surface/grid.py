@@ -48,23 +48,11 @@ def octaves_of(surface: ImplicitSurface, areas: Floats, usual: float) -> Ints:
 
 
 class Levels:
-    """The level of the voxel at every place.
+    """The level of the voxel at every place, in units of the typical spacing over the detail.
 
-    Parameters
-    ----------
-    places : ndarray, (m, 3)
-        Points, in units of the typical spacing over the detail.
-    octaves : ndarray, (m,) int
-        Of each point from `octaves_of`.
-
-    Attributes
-    ----------
-    own : ndarray, (m,) int
-        The level of each point; the voxel around it may be finer, next to finer ones.
-    unit : float
-        Width of the finest voxel.
-    top : int
-        The coarsest level; 0 where all voxels are alike.
+    Points, (m, 3), have octaves from `octaves_of`, and levels of their `own`, (m,); the voxel around a point may be
+    finer, next to finer ones. The unit is the width of the finest voxel, and the top the coarsest level; 0 where all
+    voxels are alike.
     """
 
     def __init__(self, places: Floats, octaves: Ints) -> None:

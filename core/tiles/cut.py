@@ -23,17 +23,9 @@ def halo_of(options: LaplacianOptions) -> float:
 
 
 class Room:
-    """What a tile may have with its halo, judged by a sample of the cloud.
+    """What a tile may have with its halo, in spacings, judged by a sample of the cloud, (k, 3).
 
-    Parameters
-    ----------
-    sample : ndarray, (k, 3)
-    share : float
-        How many points of the cloud each of these stands for.
-    halo : float
-        In spacings.
-    most : int
-        Points of the cloud in a tile and its halo.
+    Each of these stands for a share of points of the cloud, of which a tile and its halo have so many at most.
     """
 
     def __init__(self, sample: Floats, share: float, halo: float, most: int) -> None:
@@ -64,12 +56,8 @@ class Room:
 class Plan:
     """Planes that divide a cloud into tiles, at medians of a sample, each across the longest side.
 
-    Attributes
-    ----------
-    tiles : int
-        How many; of points at few places there may be fewer than were asked for.
-    split : int
-        How often a tile was divided once more for want of room.
+    Of points at few places there may be fewer tiles than were asked for; `split` is how often a tile was divided once
+    more for want of room.
     """
 
     def __init__(self, sample: Floats, tiles: int, room: Room | None = None) -> None:

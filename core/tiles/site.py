@@ -17,16 +17,9 @@ _LABELS = {"component": "components", "sheet": "touching"}  # by the step that t
 
 
 class Site:
-    """A tile in a step.
+    """A tile in a step, by its number; -1 for points of several.
 
-    Parameters
-    ----------
-    store : Store
-    number : int
-        Of the tile; -1 for points of several.
-    options : LaplacianOptions
-    part : Part, optional
-        The points, if they are not those of the tile.
+    The points are a part, if they are not those of the tile.
     """
 
     def __init__(self, store: Store, number: int, options: LaplacianOptions, part: Part | None = None) -> None:

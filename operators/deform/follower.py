@@ -23,17 +23,9 @@ class Moved(NamedTuple):
 
 
 class Follower:
-    """The solvers of a bound object.
+    """The solvers of a bound object: `quick`, and `exact` for settled results, made when first needed.
 
-    Attributes
-    ----------
-    binding : Binding
-    quick : CoarseDeformer or Deformer
-        For quick results.
-    exact : Deformer or CoarseDeformer or None
-        For settled results, made when first needed; of splats the same as `quick`.
-    last : dict of int to ndarray
-        The last points by session_uid, since copies of an object share the binding.
+    Of splats both are the same. The last points are kept by session_uid, since copies of an object share the binding.
     """
 
     def __init__(self, binding: Binding, progress):

@@ -6,21 +6,11 @@ _kinds = {}
 
 
 class Kind(Protocol):
-    """How the points of an object follow something, for all that is the same of whatever they follow.
+    """How the points of an object follow something, for all that is the same of whatever they follow."""
 
-    Attributes
-    ----------
-    name : str
-        Kept by the binding.
-    followed : str
-        What it follows, in texts.
-    at_once : bool
-        Whether a follower is made within a moment, so that it needs no thread.
-    """
-
-    name: str
-    followed: str
-    at_once: bool
+    name: str  # kept by the binding
+    followed: str  # what it follows, in texts
+    at_once: bool  # whether a follower is made within a moment, so that it needs no thread
 
     def key(self, obj) -> tuple:
         """Return what the follower of an object depends on: its binding, which copies share, and settings."""

@@ -4,15 +4,10 @@ import bpy
 
 
 class TreeBuilder:
-    """Adds nodes to a node tree.
+    """Adds nodes to an empty node tree.
 
-    A value of an input is a number, text or tuple, a socket, a node, which stands for the first output that it has
-    in use, or for inputs that take several links a list of these.
-
-    Parameters
-    ----------
-    tree : bpy.types.NodeTree
-        An empty one.
+    A value of an input is a number, text or tuple, a socket, a node, which stands for the first output that it has in
+    use, or for inputs that take several links a list of these.
     """
 
     def __init__(self, tree):

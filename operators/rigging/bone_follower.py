@@ -37,13 +37,7 @@ class BonePose(Pose):
 class BoneFollower:
     """What moves the points of an object that is bound to bones; see `Follower`.
 
-    Attributes
-    ----------
-    binding : BoneBinding
-    last : dict of int to None
-        Not needed, since each pose is found from rest.
-    is_prepared : bool
-    notices : list of str
+    `last` is not needed, since each pose is found from rest.
     """
 
     is_prepared = True

@@ -85,21 +85,8 @@ def _state(context, obj):
 class Job(StageTimes):
     """A computation in a thread of its own, which keeps the window responsive and can be cancelled.
 
-    Parameters
-    ----------
-    label : str
-        What is computed, for display.
-    snapshots : list of Snapshot
-        Its objects.
-    compute : callable
-        Called with the job as progress callback; must not access Blender.
-    at_once : bool
-        Whether it starts now, not in `go_on`.
-
-    Attributes
-    ----------
-    reason : str or ""
-        Why it was stopped; empty if it was not.
+    The label says for display what is computed. `compute` is called with the job as progress callback, and must not
+    access Blender. It starts at once, or in `go_on`. The reason is why it was stopped; empty if it was not.
     """
 
     def __init__(self, label, snapshots, compute, at_once=True):

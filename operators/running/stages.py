@@ -6,14 +6,7 @@ from ...command.stages import ToldStages
 
 
 class Stages(ToldStages):
-    """Times of stages, with progress at the mouse cursor; without a window, a line per stage on standard error.
-
-    Parameters
-    ----------
-    window_manager : bpy.types.WindowManager
-    label : str
-        What is computed.
-    """
+    """Times of stages, with progress at the mouse cursor; without a window, a line per stage on standard error."""
 
     def __init__(self, window_manager, label):
         super().__init__(label)

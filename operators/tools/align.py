@@ -20,10 +20,7 @@ def others(context):
 class Motion:
     """How an object is moved onto another cloud, from where it stood when its points were read.
 
-    Parameters
-    ----------
-    obj, other : bpy.types.Object
-        The other one must not be moved meanwhile.
+    The other one must not be moved meanwhile.
     """
 
     def __init__(self, obj, other):
