@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from . import core
 from .clouds import hint
+from .naming import natural
 from .stages import tell_aside
 
 if TYPE_CHECKING:
@@ -138,7 +139,7 @@ def _others(folder: Path, taken: list[Path], verb: FileVerb, arguments: argparse
     others = [path.name for path in paths if path.is_file() and not verb.owns(path, arguments)]
     if not others:
         return []
-    shown = ", ".join(sorted(others, key=_natural)[:_SHOWN]) + (", ..." if len(others) > _SHOWN else "")
+    shown = ", ".join(sorted(others, key=natural)[:_SHOWN]) + (", ..." if len(others) > _SHOWN else "")
     notice = f"Left out {len(others)} of the files in {folder}: {shown}."
     tell_aside(notice)
     return [notice]
@@ -186,16 +187,10 @@ def files_in(folder: Path, endings: Sequence[str] = _READ) -> list[Path]:
         ) from error
     if not paths:
         raise core.PointCloudError(f"{folder} has no files with points. Name one with files of {', '.join(endings)}.")
-    return sorted(paths, key=lambda path: _natural(path.name))
+    return sorted(paths, key=lambda path: natural(path.name))
 
 
 _SHOWN = 5  # names of what is left out
-
-
-def _natural(name: str) -> list[str | int]:
-    """Return a key by which names are in the order of the numbers in them."""
-    parts = re.split(r"(\d+)", name.lower(), flags=re.ASCII)
-    return [int(part) if index % 2 else part for index, part in enumerate(parts)]
 
 
 def output_path(path: Path, arguments: argparse.Namespace) -> Path | None:

@@ -1,7 +1,8 @@
-"""Errors that name what they are about."""
+"""Errors that name what they are about, and the order of names."""
 
 from __future__ import annotations
 
+import re
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -21,3 +22,9 @@ def naming(name: str | Path) -> Iterator[None]:
         if f'"{name}"' in str(error):
             raise
         raise core.PointCloudError(f'"{name}": {error}') from error
+
+
+def natural(name: str) -> list[str | int]:
+    """Return a key by which names are in the order of the numbers in them."""
+    parts = re.split(r"(\d+)", name.lower(), flags=re.ASCII)
+    return [int(part) if index % 2 else part for index, part in enumerate(parts)]

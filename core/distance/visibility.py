@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from ..arguments import as_doubles, check_array
 from ..errors import PointCloudError
-from ..geometry import as_mask
+from ..geometry import as_mask, frames
 from ..types import Bools, Floats, Ints
 
 _OBLIQUE = 3.0  # slope to the ray of a surface without normals that is told from what lies behind it: 72 degrees
@@ -81,7 +81,7 @@ def seen_points(
         depth = offset @ axis
         far = np.ones(count) if eye is None else depth
         rays = np.tile(axis, (count, 1)) if eye is None else offset / depth[:, None]
-        image, reach = offset @ _across(axis).T / far[:, None], radius / far
+        image, reach = offset @ frames(axis[None])[0, :, 1:] / far[:, None], radius / far
         shown = np.isfinite(image).all(axis=1) & np.isfinite(reach) & (reach > 0.0) & (far > 0.0)
     advice = f"Give {count} vectors."
     given = np.zeros((count, 3)) if normals is None else check_array(normals, "Normals", [(count, 3)], advice)
@@ -102,13 +102,6 @@ def seen_points(
             behind = _is_behind(places, radius, rays, facing, axis, asked, other)
             seen[asked[behind]] = False
     return seen
-
-
-def _across(axis: Floats) -> Floats:
-    """Return two unit vectors across an axis, (2, 3)."""
-    first = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
-    first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(axis, first)])
 
 
 def _pairs(image: Floats, depth: Floats, hiding: Ints, asked: Ints) -> Iterator[tuple[Ints, Ints]]:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from ..arguments import check_plane
 from ..distance import polygon_length
 from ..frozen import Frozen
+from ..geometry import frames
 from ..operator import ImplicitSurface, LaplaceBeltrami
 from ..progress import ends_at_one
 from ..surface import mesh_surface
@@ -135,7 +136,7 @@ def cross_section(
     lines, flat = _onto(ImplicitSurface(laplacian, spacing), lines, across, lambda: report("Section", 0.97))
     kept = [line for line in lines if _length(line) > _SHORT * spacing]
     kept.sort(key=_length, reverse=True)
-    areas = _areas(kept, _axes(across), place)
+    areas = _areas(kept, frames(across[None])[0, :, 1:], place)
     curves = [
         SectionCurve(line.points, line.closed, _length(line), float(area))
         for line, area in zip(kept, areas, strict=True)
@@ -189,16 +190,9 @@ def _finer(line: IsoLine, longest: float) -> Floats:
     return np.column_stack([np.interp(places, at, column) for column in corners.T])
 
 
-def _axes(across: Floats) -> Floats:
-    """Return two unit vectors in a plane, (2, 3)."""
-    first = np.cross(across, np.eye(3)[np.abs(across).argmin()])
-    first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(across, first)])
-
-
 def _areas(lines: list[IsoLine], axes: Floats, place: Floats) -> Floats:
-    """Return the areas that lines in a plane enclose, (l,): negative inside an odd number of others, 0 if open."""
-    loops = [(line.points - place) @ axes.T if line.closed else np.zeros((1, 2)) for line in lines]
+    """Return the areas, (l,), that lines enclose in the plane of axes, (3, 2): negative for holes, 0 if open."""
+    loops = [(line.points - place) @ axes if line.closed else np.zeros((1, 2)) for line in lines]
     first = np.array([loop[0] for loop in loops]).reshape(-1, 2)
     closed = np.array([line.closed for line in lines], dtype=bool)
     sizes, depth = np.zeros(len(lines)), np.zeros(len(lines), dtype=int)

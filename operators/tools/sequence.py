@@ -1,6 +1,5 @@
 """Analysis of all frames of a sequence, with modes matched from frame to frame and one color range."""
 
-import re
 from dataclasses import replace
 
 import bpy
@@ -8,7 +7,7 @@ import numpy as np
 from bpy.props import BoolProperty, IntProperty
 
 from ...command.analysis import WRITE_LIMIT, continued
-from ...command.naming import naming
+from ...command.naming import naming, natural
 from ...core import PointCloudError
 from ...tools.quantities import AREA, MEAN_CURVATURE, eigenvector_name
 from ..objects.all_or_nothing import all_or_nothing
@@ -28,12 +27,7 @@ def frames_of(obj) -> list:
     collection = modifier and get_input(modifier, COLLECTION)
     if collection is None:
         return []
-    return sorted(collection.objects, key=lambda item: _natural(item.name))
-
-
-def _natural(name):
-    parts = re.split(r"(\d+)", name.lower(), flags=re.ASCII)
-    return [int(part) if index % 2 else part for index, part in enumerate(parts)]
+    return sorted(collection.objects, key=lambda item: natural(item.name))
 
 
 def continue_modes(analysis, points, earlier):
