@@ -2,9 +2,9 @@
 
 As many suites run side by side as there are cores, of the machine, a container or by MESHFREE_CORES, while this
 program makes the environments of the next ones; each but the window's in four parts, of every fourth file, so that no
-core waits long for the last. With --all each part of core's computes by other kernels of OpenBLAS, on one thread or
-two, for no result may hang on how these round. What pytest prints goes to a file per suite in build/tests/, and from
-there to the screen where a test fails.
+core waits long for the last. With --all each part of core's computes by other kernels of OpenBLAS, on one core and
+thread or two, for no result may hang on how these round. What pytest prints goes to a file per suite in build/tests/,
+and from there to the screen where a test fails.
 """
 
 import argparse
@@ -58,10 +58,13 @@ class Suites:
         self._runs.append(self._pool.submit(self._run, name, python, tests, variables))
 
     def start_folder(self, name, python, folder, *options, variables=({},)):
-        """Run the tests of a folder in parts, by their files, with these options of pytest; variables take turns."""
+        """Run the tests of a folder in parts, by their files, with these options of pytest; variables take turns.
+
+        Each computes on one core unless they say otherwise: on clouds this small threads wait longer than they work.
+        """
         files = sorted(path.relative_to(ROOT) for path in (ROOT / folder).glob("test_*.py"))
         for number in range(_PARTS):
-            chosen = variables[number % len(variables)]
+            chosen = {"MESHFREE_CORES": "1", **variables[number % len(variables)]}
             self.start(f"{name}-{number + 1}", python, *options, *files[number::_PARTS], **chosen)
 
     def results(self):
@@ -156,7 +159,7 @@ def take_turns(known, first):
     """Return variables for each part of an environment, the first of whose parts has this number among all parts."""
     turns = []
     for number in range(first, first + _PARTS):
-        threads = {"OPENBLAS_NUM_THREADS": "12"[(number + number // _PARTS) % 2]}
+        threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "MESHFREE_CORES"), "12"[(number + number // _PARTS) % 2])
         turns.append({"OPENBLAS_CORETYPE": known[number % len(known)], **threads} if known else threads)
     return turns
 
@@ -209,7 +212,8 @@ def main():
         for version, python in found:
             for blender in pythons.BLENDERS[version][: None if options.all else 1]:
                 environment = ensure_blender(blender, python)
-                suites.start_folder(f"blender-{blender}", environment, "tests/blender", *narrowed)
+                turns = ({}, {"MESHFREE_CORES": "2"}) if options.all else ({},)
+                suites.start_folder(f"blender-{blender}", environment, "tests/blender", *narrowed, variables=turns)
                 narrowed = "-m", "not any_blender"
         results = suites.results()
     if any(name.startswith(MEASURED) for name in results):

@@ -29,6 +29,6 @@ def test_all_kernels_and_numbers_of_threads_take_turns(count):
     known = run_tests.KERNELS[:count]
     parts = run_tests.take_turns(known, 0) + run_tests.take_turns(known, 4)
     assert {part.get("OPENBLAS_CORETYPE") for part in parts} == (set(known) or {None})
-    assert {part["OPENBLAS_NUM_THREADS"] for part in parts} == {"1", "2"}
+    assert {(part["OPENBLAS_NUM_THREADS"], part["MESHFREE_CORES"]) for part in parts} == {("1", "1"), ("2", "2")}
     # What a part of the first environment computes with, the same part of the second one does not.
     assert all(one != other for one, other in zip(parts[:4], parts[4:], strict=True))
