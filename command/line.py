@@ -144,7 +144,17 @@ def _is_scarcity(error: BaseException | None) -> bool:
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser that tells of wrong usage in one line."""
+    """A parser that tells of wrong usage in one line; that of a verb gets its options where it is chosen."""
+
+    verb: Verb | None = None
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:  # which that of all verbs calls
+        if self.verb is not None:
+            add_files(self, self.verb)
+            add_report(self)
+            self.verb.add_options(self)
+            self.set_defaults(command=(self.verb, self))
+        return super().parse_known_args(args, namespace)
 
     def error(self, message: str) -> NoReturn:
         text = " ".join(message.split())
@@ -163,10 +173,7 @@ def _parse(argv: list[str], verbs: Sequence[Verb], program: str) -> tuple[Verb, 
             group = commands.add_parser(first, help=f"verbs of their own: {program} {first} --help")
             groups[first] = group.add_subparsers(metavar="VERB", required=True)
         known = (groups[first] if first else commands).add_parser(second, help=verb.help, description=verb.description)
-        add_files(known, verb)
-        add_report(known)
-        verb.add_options(known)
-        known.set_defaults(command=(verb, known))
+        known.verb = verb
     arguments = parser.parse_args([*" ".join(argv[:1]).split(), *argv[1:]])  # two words may come as one
     verb, chosen = arguments.command
     check_report(chosen, arguments)
