@@ -1,6 +1,7 @@
 """The materials that show values: as colours of a map, directions, checks, groups, splats, and strokes."""
 
 import bpy
+import numpy as np
 
 from ..operators.objects.attributes import DISC, RISE
 from ..operators.objects.node_trees import TreeBuilder
@@ -283,8 +284,8 @@ def _set_colors(elements, colors, last):
         elements[0].position = 0.0
         for place in places[1:]:
             elements.new(place)
-    for element, color in zip(elements, colors, strict=True):
-        element.color = color
+    elements.foreach_set("color", np.float32(colors).ravel())
+    elements[0].color = colors[0]  # after each that is set alone Blender updates all nodes of the file
 
 
 def _direction_color(tree, vector):
