@@ -3,9 +3,13 @@
 import importlib
 import importlib.util
 import os
+import pickle
 import shutil
+import sys
 import tempfile
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from weakref import WeakKeyDictionary
 
 import pytest
@@ -56,13 +60,14 @@ def new_file():
 
 @pytest.fixture(scope="session", autouse=True)
 def known_results(installed):
-    """Keep what was computed when another file is opened, for many tests use the same clouds.
+    """Keep what was computed when another file is opened, for many tests use the same clouds, and weigh none of it.
 
     Tests of the computation itself empty the cache, by its fixture; test_cache.py tries that another file does so.
     """
     import bpy
 
     cache, kept = part("operators.running.cache"), {}
+    put = cache._put
 
     @bpy.app.handlers.persistent
     def keep(*_):
@@ -76,27 +81,57 @@ def known_results(installed):
     handlers = bpy.app.handlers
     handlers.load_pre.insert(0, keep)
     handlers.load_post.insert(0, take)
-    yield keep
+    cache._put = cache._kept.__setitem__
+    yield SimpleNamespace(keep=keep, put=put)
+    cache._put = put
     handlers.load_pre.remove(keep)
     handlers.load_post.remove(take)
 
 
 @pytest.fixture(scope="session", autouse=True)
 def known_operators(installed):
-    """Build the narrow operators, by which tools solve on a cloud, only once for each operator that is kept."""
-    known = WeakKeyDictionary()
+    """Build each operator only once, and the narrow one by which tools solve once for each operator that is kept.
+
+    Where it is known its stages are told again, and it has nothing that was computed of it. Yield a switch of that.
+    """
+    switch, known, narrow_ones = SimpleNamespace(on=True), {}, WeakKeyDictionary()
+    module = part("core.operator.laplacian")
+    build = module.build_laplacian
+
+    @part("core.progress").ends_at_one
+    def build_once(*given, progress=None, **named):
+        if not switch.on:
+            return build.__wrapped__(*given, progress=progress, **named)
+        report, key = progress or (lambda stage, fraction: None), pickle.dumps((given, named))
+        if key not in known:
+            stages = []
+
+            def tell(*stage):
+                stages.append(stage)
+                report(*stage)
+
+            known[key] = build.__wrapped__(*given, progress=tell, **named), stages
+        else:
+            for stage in known[key][1]:
+                report(*stage)
+        return replace(known[key][0])
+
+    for place in [found for name, found in sys.modules.items() if name.startswith(MODULE)]:
+        if vars(place).get("build_laplacian") is build:  # others import it later
+            place.build_laplacian = build_once
     deformation = part("core.deform.deformation")
     narrow_laplacian = deformation.narrow_laplacian
 
     def narrow(laplacian, *settings, progress=None):
-        results = known.setdefault(laplacian, {})
+        results = narrow_ones.setdefault(laplacian, {})
         if settings not in results:
             results[settings] = narrow_laplacian(laplacian, *settings, progress=progress)
         return results[settings]
 
     deformation.narrow_laplacian = narrow
-    yield
+    yield switch
     deformation.narrow_laplacian = narrow_laplacian
+    switch.on = False
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -161,8 +196,10 @@ options = _module("operators.objects.options")
 
 
 @pytest.fixture
-def cache(installed):
-    """The module that keeps what was computed, emptied."""
+def cache(known_results, known_operators, monkeypatch):
+    """The module that keeps what was computed, emptied; operators are built anew."""
     cache = part("operators.running.cache")
     cache.clear()
+    monkeypatch.setattr(cache, "_put", known_results.put)
+    monkeypatch.setattr(known_operators, "on", False)
     return cache

@@ -224,12 +224,12 @@ class TestMemory:
         assert not known & set(cache._kept) - {"a"}
 
     def test_another_file_gives_it_back(self, cache, known_results):
-        bpy.app.handlers.load_pre.remove(known_results)
+        bpy.app.handlers.load_pre.remove(known_results.keep)
         add_object(sphere_points(300))
         bpy.ops.meshfree.analyze()
         assert len(cache._kept) > 0
         bpy.ops.wm.read_homefile(use_empty=True)
-        bpy.app.handlers.load_pre.insert(0, known_results)
+        bpy.app.handlers.load_pre.insert(0, known_results.keep)
         assert len(cache._kept) == 0
 
     def test_threads_share_it(self, cache, monkeypatch):
