@@ -2,6 +2,8 @@
 
 import re
 import shlex
+import shutil
+from contextlib import chdir
 from dataclasses import replace
 from itertools import pairwise
 
@@ -11,7 +13,7 @@ import pytest
 
 from tests.blender.armatures import add_armature
 from tests.blender.clouds import add_group, add_object, sphere_points
-from tests.blender.conftest import new_file
+from tests.blender.conftest import new_file, part
 from tests.blender.splats import bar_splats
 from tests.blender.test_command import run  # noqa: F401
 from tests.pages import ROOT, snippets
@@ -42,44 +44,57 @@ def columns(points):
     return dict(zip(COLUMNS, np.float32(values), strict=True))
 
 
-@pytest.fixture
-def folder(core, run, tmp_path, monkeypatch):  # noqa: F811
-    """The working folder, with all files that the commands name."""
-    monkeypatch.chdir(tmp_path)
+@pytest.fixture(scope="module")
+def made(installed, tmp_path_factory):
+    """A folder with all files that the commands name."""
+    folder = tmp_path_factory.mktemp("made")
+    with chdir(folder):
+        make(folder)
+    return folder
+
+
+def make(folder):
+    core = part("core")
+    new_file()
     scan = open_sphere()
     for name in ("scan", "plan"):
-        write_ply(tmp_path / f"{name}.ply", columns(scan))
+        write_ply(folder / f"{name}.ply", columns(scan))
     table = columns(scan)
     np.savetxt("scan.csv", np.column_stack(list(table.values())), delimiter=",", header=",".join(table), comments="")
     around = np.linspace(0.0, 2.0 * np.pi, 40)[:-1]
     np.savetxt("seam.xyz", np.column_stack([0.8 * np.cos(around), 0.8 * np.sin(around), 0.6 + 0.0 * around]))
     for name in ("days", "frames", "scans"):
-        (tmp_path / name).mkdir()
+        (folder / name).mkdir()
         for number in (1, 2):
-            write_ply(tmp_path / name / f"{name}_{number}.ply", columns(scan * [1.0, 1.0, 1.0 + 0.02 * number]))
-    write_las(tmp_path / "first.las", scan)
-    (tmp_path / "survey").mkdir()
+            write_ply(folder / name / f"{name}_{number}.ply", columns(scan * [1.0, 1.0, 1.0 + 0.02 * number]))
+    write_las(folder / "first.las", scan)
+    (folder / "survey").mkdir()
     for number, tile in enumerate(np.split(scan[np.argsort(scan[:, 0])][: len(scan) // 2 * 2], 2)):
-        write_las(tmp_path / "survey" / f"tile_{number}.laz", tile)
+        write_las(folder / "survey" / f"tile_{number}.laz", tile)
     rigged = add_object(scan)
     for name, members in (("Arm", scan[:, 0] > 0.0), ("Leg", scan[:, 0] <= 0.0)):
         add_group(rigged, name, members)
     rigged.parent = add_armature(
         {"Arm": ((0.0, 0.0, 0.0), (0.8, 0.0, 0.0)), "Leg": ((0.0, 0.0, 0.0), (-0.8, 0.0, 0.0))}
     )
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "rigged.blend"), copy=True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "rigged.blend"), copy=True)
     new_file()
-    (tmp_path / "list.txt").write_text("scan.ply\nplan.ply\ndays/days_1.ply\ndays/days_2.ply\n")
-    assert run("info", "scan.ply", "--report", "reports/2.jsonl")[0] == 0
+    (folder / "list.txt").write_text("scan.ply\nplan.ply\ndays/days_1.ply\ndays/days_2.ply\n")
+    assert part("operators.files.command").run(["info", "scan.ply", "--report", "reports/2.jsonl"]) == 0
     bar = bar_splats(core)
     small = replace(bar, positions=np.float32(0.4 * bar.positions), scales=np.float32(0.4 * bar.scales))
     for name in ("guitar", "a", "b"):
-        core.splats.write_splats(tmp_path / f"{name}.ply", small)
+        core.splats.write_splats(folder / f"{name}.ply", small)
     add_armature({"Bone": ((0.0, 0.0, 0.0), (0.0, 0.0, 0.8))})
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "rig.blend"))
-    new_file()
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "rig.blend"))
     [handles] = snippets("json")
-    (tmp_path / "bend.json").write_text(handles.text)
+    (folder / "bend.json").write_text(handles.text)
+
+
+@pytest.fixture
+def folder(made, tmp_path, monkeypatch):
+    """The working folder, with copies of these files."""
+    monkeypatch.chdir(shutil.copytree(made, tmp_path, dirs_exist_ok=True))
     return tmp_path
 
 
