@@ -16,7 +16,7 @@ def expected(core, obj):
     laplacian = core.build_laplacian(local_points(obj) @ matrix.T)
     normals = laplacian.normals @ matrix
     squared = ((laplacian.points[:, None] - laplacian.points) ** 2).sum(axis=2)
-    spacing = np.median(np.sqrt(np.sort(squared, axis=1)[:, 8] * np.pi / 8.0))
+    spacing = np.median(np.sqrt(np.partition(squared, 8, axis=1)[:, 8] * np.pi / 8.0))
     return {
         "lb_area": laplacian.areas,
         "lb_boundary": laplacian.boundary,
