@@ -20,8 +20,10 @@ import yaml
 from .conftest import ROOT, call, site
 
 CODE = "import sys; from meshfree_laplacian.command.main import main; sys.exit(main())"
-LENGTH, RADIUS, COUNT = 12.0, 0.125, 4000
-OPTIONS = ("--tile-points", 700, "--memory", "2GB", "--format", "npy")
+# Tells after a second that nobody answers.
+SOON = f"from meshfree_laplacian.command import tile_work; tile_work._CONNECTING = 1; {CODE}"
+LENGTH, RADIUS, COUNT = 12.0, 0.1, 2800
+OPTIONS = ("--tile-points", 490, "--memory", "2GB", "--format", "npy")
 KILLED_AFTER = "agreed-spacing.npz"  # what is there when a worker is killed
 
 
@@ -168,10 +170,10 @@ def test_the_manual_has_the_settings_of_dask(place):
     assert yaml.safe_load(text) == wanted
 
 
-def run(place, folder, *arguments):
+def run(place, folder, *arguments, code=CODE):
     """Run tiles in a folder, and return the exit code, the last line, and what is told besides."""
     known = {**os.environ, "PYTHONPATH": str(site(place)), "OPENBLAS_NUM_THREADS": "1"}
-    given = [sys.executable, "-c", CODE, "tiles", "run", "rod.npy", *map(str, (*arguments, *OPTIONS))]
+    given = [sys.executable, "-c", code, "tiles", "run", "rod.npy", *map(str, (*arguments, *OPTIONS))]
     done = subprocess.run(given, cwd=folder, env=known, capture_output=True, text=True, timeout=250)
     return done.returncode, json.loads(done.stdout.splitlines()[-1]), done.stderr
 
@@ -209,7 +211,7 @@ def cluster(place):
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nowhere", "tcp://no.such.host.invalid:8786"])
 def test_a_scheduler_that_does_not_answer_is_told_before_any_work(place, folder, tmp_path, address):
-    code, line, besides = run(place, folder, "--out-dir", tmp_path / "out", "--scheduler", address)
+    code, line, besides = run(place, folder, "--out-dir", tmp_path / "out", "--scheduler", address, code=SOON)
     assert (code, "No scheduler of Dask answers" in line["error"], address in line["error"]) == (1, True, True)
     assert "Traceback" not in besides
     assert not (tmp_path / "out" / "store").exists()
