@@ -1,3 +1,5 @@
+import functools
+
 import numpy as np
 import pytest
 
@@ -90,18 +92,30 @@ def heap(count, half=1.6, seed=2):
     return np.column_stack([places, np.maximum(0.5 * (1.0 - np.hypot(*places.T)), 0.0)])
 
 
+@functools.cache
+def heap_within(count, most, scale=1.0):
+    """The operator of the points of a heap up to so far from its axis, and which of them are the heap's."""
+    points = heap(count)
+    far = np.hypot(*points[:, :2].T)
+    return core.build_laplacian(scale * points[far < most]), far[far < most] < 1.05
+
+
+@functools.cache
+def heap_without_a_quadrant(count, ground, scale):
+    """The same where a quadrant is missing, with its ground or without."""
+    points = heap(count)
+    far = np.hypot(*points[:, :2].T)
+    kept = (points[:, :2] <= 0.0).any(axis=1) | (ground & (far >= 1.0))
+    return core.build_laplacian(scale * points[kept]), far[kept] < 1.05
+
+
 class TestMissingPieces:
-    @pytest.mark.parametrize("count", [1500, 7000])
+    @pytest.mark.parametrize(("count", "scale"), [(1500, 1.0), (1500, 1000.0), (7000, 1000.0)])
     @pytest.mark.parametrize("plane", [None, ([0.0, 0.0, 0.0], [0.0, 0.0, 1.0])])
-    @pytest.mark.parametrize("scale", [1.0, 1000.0])
     def test_a_quadrant_is_told_unless_its_volume_is_known(self, count, plane, scale):
         """In few points a hole may be as wide as gaps between them: areas around it fill it."""
-        points = heap(count)
-        far = np.hypot(*points[:, :2].T)
-        quadrant = (points[:, :2] > 0.0).all(axis=1)
-        for missing in quadrant & (far < 1.0), quadrant:
-            laplacian = core.build_laplacian(scale * points[~missing])
-            found = core.measure.pile_volume(laplacian, far[~missing] < 1.05, plane=plane)
+        for ground in True, False:
+            found = core.measure.pile_volume(*heap_without_a_quadrant(count, ground, scale), plane=plane)
             known = abs(found.above - found.below - scale**3 * np.pi / 6.0) < found.uncertainty
             told = [notice.startswith("The surface ends within the part along ") for notice in found.notices]
             assert told == [True] or (known and count < 2000)
@@ -109,10 +123,8 @@ class TestMissingPieces:
     @pytest.mark.parametrize("count", [1500, 7000])
     @pytest.mark.parametrize("plane", [None, ([0.0, 0.0, 0.0], [0.0, 0.0, 1.0])])
     def test_whole_heaps_are_not_told_of_with_ground_and_without(self, count, plane):
-        points = heap(count)
-        far = np.hypot(*points[:, :2].T)
-        for kept in far < 9.0, far < 1.0:
-            found = core.measure.pile_volume(core.build_laplacian(points[kept]), far[kept] < 1.05, plane=plane)
+        for most in 9.0, 1.0:
+            found = core.measure.pile_volume(*heap_within(count, most), plane=plane)
             assert found.notices == []
             assert found.above - found.below == pytest.approx(np.pi / 6.0, rel=0.02, abs=found.uncertainty)
 
@@ -120,38 +132,38 @@ class TestMissingPieces:
 class TestHeights:
     up = ([0.0, 0.0, 0.0], [0.0, 0.0, 1.0])
 
-    def over(self, points, ground):
-        laplacian = core.build_laplacian(points)
-        normals = np.tile(self.up[1], (len(points), 1))
-        found = core.measure.surface_deviation(core.build_laplacian(ground), laplacian.surface_points, normals)
-        return laplacian, np.where(found.known, found.distance, np.nan)
+    def over(self, laplacian, ground):
+        normals = np.tile(self.up[1], (len(laplacian.points), 1))
+        found = core.measure.surface_deviation(ground, laplacian.surface_points, normals)
+        return np.where(found.known, found.distance, np.nan)
 
     def test_fill_and_cut_between_two_surveys(self):
         """A heap that was put beside a pit of the same form, on ground that slopes."""
-        before, after = heap(6000, 3.0, 1), heap(6000, 3.0, 5)
+        count = 4000
+        before, after = heap(count, 3.0, 1), heap(count, 3.0, 5)
         for points, sign, x in (before, -1.0, 1.2), (after, 1.0, -1.2):
             high = np.maximum(0.5 * (1.0 - np.hypot(points[:, 0] - x, points[:, 1])), 0.0)
             points[:, 2] = sign * high + 0.2 * points[:, 0] + 0.1 * points[:, 1]
-        laplacian, heights = self.over(after, before)
-        found = core.measure.pile_volume(laplacian, np.ones(6000, dtype=bool), plane=self.up, heights=heights)
+        before, after, all_ = core.build_laplacian(before), core.build_laplacian(after), np.ones(count, dtype=bool)
+        found = core.measure.pile_volume(after, all_, plane=self.up, heights=self.over(after, before))
         assert found.above == pytest.approx(np.pi / 3.0, rel=0.03)
         assert found.below < 0.01
-        laplacian, heights = self.over(before, after)
-        found = core.measure.pile_volume(laplacian, np.ones(6000, dtype=bool), plane=self.up, heights=heights)
+        found = core.measure.pile_volume(before, all_, plane=self.up, heights=self.over(before, after))
         assert found.below == pytest.approx(np.pi / 3.0, rel=0.03)
         assert found.above < 0.01
 
     def test_over_a_flat_cloud_it_is_that_over_a_plane(self):
-        points = heap(3000)
-        laplacian, heights = self.over(points, heap(3000, 2.0, 9) * [1.0, 1.0, 0.0])
-        within = np.hypot(*points[:, :2].T) < 1.2
+        laplacian, _ = heap_within(3000, 9.0)
+        heights = self.over(laplacian, core.build_laplacian(heap(3000, 2.0, 9) * [1.0, 1.0, 0.0]))
+        within = np.hypot(*laplacian.points[:, :2].T) < 1.2
         one = core.measure.pile_volume(laplacian, within, plane=self.up)
         other = core.measure.pile_volume(laplacian, within, plane=self.up, heights=heights)
         assert [other.above, other.below] == pytest.approx([one.above, one.below], abs=1e-6)
 
     def test_what_has_nothing_below_is_told(self):
-        points = heap(3000)
-        laplacian, heights = self.over(points, (heap(3000, 2.0, 9) + [2.0, 0.0, 0.0]) * [1.0, 1.0, 0.0])
+        laplacian, _ = heap_within(3000, 9.0)
+        ground = core.build_laplacian((heap(3000, 2.0, 9) + [2.0, 0.0, 0.0]) * [1.0, 1.0, 0.0])
+        heights = self.over(laplacian, ground)
         found = core.measure.pile_volume(laplacian, np.ones(3000, dtype=bool), plane=self.up, heights=heights)
         assert found.above == pytest.approx(np.pi / 12.0, rel=0.05)
         assert any("have nothing of the other surface above or below" in notice for notice in found.notices)

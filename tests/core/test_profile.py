@@ -1,11 +1,18 @@
 """Profiles: linear functions as they are, others to second order, by the distance along the path."""
 
+import functools
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 import core
 from benchmarks.samplings import fibonacci_sphere, random_sphere, square_random
+
+
+@functools.cache
+def operator_of(sample, *given):
+    return core.build_laplacian(sample(*given))
 
 
 def test_on_a_plane_linear_functions_stay_linear():
@@ -40,8 +47,8 @@ def test_close_sheets_stay_apart():
 
 
 def test_it_follows_turn_translation_scale_and_order():
-    points = core.example_sphere()
-    laplacian = core.build_laplacian(points)
+    laplacian = operator_of(core.example_sphere)
+    points = laplacian.points
     path = core.distance.geodesic_path(laplacian, 3, 500)
     before = core.measure.profile(laplacian, path, points[:, 0])
     turn = Rotation.from_rotvec([0.3, -1.1, 0.7]).as_matrix()
@@ -63,11 +70,10 @@ def test_unknown_values_are_gaps_and_no_others():
 
 @pytest.mark.parametrize("noise", [0.0, 0.02, 0.2])
 def test_the_uncertainty_holds_nearly_all_errors_and_not_much_more(noise):
-    points = random_sphere(2000)
-    laplacian = core.build_laplacian(points)
+    laplacian = operator_of(random_sphere, 2000)
     angle = np.linspace(0.2, 2.9, 300)
     path = np.column_stack([np.sin(angle), 0.0 * angle, np.cos(angle)])
-    values = points[:, 0] ** 2 + noise * np.random.default_rng(2).standard_normal(2000)
+    values = laplacian.points[:, 0] ** 2 + noise * np.random.default_rng(2).standard_normal(2000)
     found = core.measure.profile(laplacian, path, np.column_stack([values, np.full(2000, 3.0)]))
     error = np.abs(found.values[:, 0] - np.sin(angle) ** 2)
     assert np.mean(error <= found.uncertainty[:, 0]) > 0.85
@@ -96,4 +102,4 @@ def test_the_uncertainty_is_unknown_where_values_are():
 )
 def test_wrong_arrays_are_refused(path, values, text):
     with pytest.raises(core.InvalidPointsError, match=text):
-        core.measure.profile(core.build_laplacian(core.example_sphere()), path, values)
+        core.measure.profile(operator_of(core.example_sphere), path, values)

@@ -80,6 +80,7 @@ def test_gradients_of_a_sheet_rolled_up_are_its_turns():
     assert np.quantile(np.abs(found - wanted).max(axis=(1, 2)), 0.99) < 0.05
 
 
+@functools.cache
 def with_floaters():
     points = np.concatenate([fibonacci_sphere(2000), [[0.0, 0.0, 2.0], [0.0, 1.8, 0.0], [0.0, 0.0, -1.9]]])
     return core.build_laplacian(points)
