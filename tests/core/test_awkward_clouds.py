@@ -204,7 +204,7 @@ def check_scale(before, after, scale):
     np.testing.assert_array_equal(after.stiffness.data, before.stiffness.data)
 
 
-@tried(80)
+@tried(50)
 @given(points=clouds(), options=choices(), seed=st.integers(0, 2**32 - 1), layout=st.sampled_from(list(LAYOUTS)))
 def test_any_cloud_with_any_options_in_any_order_and_layout(points, options, seed, layout):
     points = np.asarray(points, dtype=np.float32 if layout == "single" else np.float64)
@@ -344,7 +344,7 @@ def use(laplacian, name):
         return type(error)
 
 
-@tried(120)
+@tried(60)
 @given(
     points=clouds(),
     options=choices(),

@@ -64,11 +64,10 @@ def test_there_is_a_cause_where_trust_is_low_and_nowhere_else(told):
     np.testing.assert_array_equal(laplacian.doubt == Doubt.LEFT_OUT, laplacian.component < 0)
 
 
-@pytest.mark.parametrize("turned", [False, True])
-def test_the_cause_moves_with_the_points(told, turned):
+def test_the_cause_moves_with_the_points(told):
     laplacian = told[1]
     order = np.random.default_rng(1).permutation(len(laplacian.points))
-    turn = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0] if turned else np.eye(3)
+    turn = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]
     after = core.build_laplacian((7e3 * laplacian.points @ turn + 4.0)[order])
     before = laplacian.doubt[order]
     assert np.mean(after.doubt == before) > 0.95  # where moments cannot be met, what is left depends on rounding

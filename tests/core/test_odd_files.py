@@ -212,8 +212,9 @@ class TestGrids:
         assert f"{self.COLUMNS} x {self.ROWS} heights" in notice
         assert f"left out {np.count_nonzero(self.GAPS):,} without data" in notice
 
-    @pytest.mark.parametrize("suffix", ["asc", "txt", "xyz", "grd"])
-    @pytest.mark.parametrize("place", ["corner", "center"])
+    @pytest.mark.parametrize(
+        ("suffix", "place"), [("asc", "corner"), ("txt", "center"), ("xyz", "corner"), ("grd", "center")]
+    )
     @pytest.mark.parametrize(
         ("missing", "word"), [("-9999", "-9999"), ("-9999", "-9999.00"), ("nan", "nan"), (None, "-9999")]
     )

@@ -46,26 +46,27 @@ from core.tiles import cut_to_store
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 points = np.random.default_rng(0).random((20000, 3))
 resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
-path = Path(sys.argv[1])
-try:
-    if path.name == "store":
-        cut_to_store(lambda: [(points, {})], path, 9000)
-    elif path.suffix == ".npz":
-        write_arrays(path, {"few": points[:9], "points": points})
-    else:
-        write_points(path, PointTable(points))
-except ValueError as error:
-    print(type(error).__name__, error.__cause__.errno, error)
+for path in map(Path, sys.argv[1:]):
+    try:
+        if path.name == "store":
+            cut_to_store(lambda: [(points, {})], path, 9000)
+        elif path.suffix == ".npz":
+            write_arrays(path, {"few": points[:9], "points": points})
+        else:
+            write_points(path, PointTable(points))
+    except ValueError as error:
+        print(type(error).__name__, error.__cause__.errno, error)
 """
 
-    @pytest.mark.parametrize("name", ["a.ply", "a.xyz", "a.csv", "a.npz", "store"])
-    def test_nothing_is_left_under_the_final_name(self, tmp_path, name):
+    def test_nothing_is_left_under_the_final_name(self, tmp_path):
         """At the system's limit for the size of a file, which a write may reach in its middle."""
-        told, aside = run(self.FULL, tmp_path / name).communicate()
-        kind, number, *_ = told.split()
-        assert (kind, int(number) in (errno.ENOSPC, errno.EFBIG)) == ("PointCloudError", True)
-        assert f"{tmp_path / name} cannot be written" in told
+        paths = [tmp_path / name for name in ("a.ply", "a.xyz", "a.csv", "a.npz", "store")]
+        told, aside = run(self.FULL, *paths).communicate()
         assert aside == ""
+        for path, line in zip(paths, told.splitlines(), strict=True):
+            kind, number, *_ = line.split()
+            assert (kind, int(number) in (errno.ENOSPC, errno.EFBIG)) == ("PointCloudError", True)
+            assert f"{path} cannot be written" in line
         assert list(tmp_path.iterdir()) == []
 
     def test_an_older_file_stays(self, tmp_path):
