@@ -39,11 +39,11 @@ def slit_square(kind, count, wide, seed, deep=0.75):
 
 
 def slit_eigenvalue(half, deep=0.75, cells=200):
-    """The first eigenvalue of the slit square above zero, by finite differences."""
+    """The first eigenvalue of the slit square above zero, by finite differences on a half: its function is odd in x."""
     size = 2.0 / cells
     middle = size * (np.arange(cells) + 0.5) - 1.0
-    x, y = np.meshgrid(middle, middle, indexing="ij")
-    inside = ~((np.abs(x) < half) & (y < 2.0 * deep - 1.0))
+    x, y = np.meshgrid(middle[cells // 2 :], middle, indexing="ij")
+    inside = ~((x < half) & (y < 2.0 * deep - 1.0))
     number = np.where(inside, np.cumsum(inside).reshape(inside.shape) - 1, -1)
     pairs = np.concatenate(
         [
@@ -55,8 +55,8 @@ def slit_eigenvalue(half, deep=0.75, cells=200):
     pairs = pairs[:, (pairs >= 0).all(axis=0)]
     weights = sparse.csr_array((np.ones(pairs.shape[1]), tuple(pairs)), shape=(inside.sum(),) * 2)
     weights = weights + weights.T
-    stiffness = sparse.diags_array(weights.sum(axis=1)) - weights
-    return eigsh((stiffness / size**2).tocsc(), 2, sigma=-1e-3)[0][1]
+    stiffness = sparse.diags_array(weights.sum(axis=1) + 2.0 * (x[inside] < size)) - weights
+    return eigsh((stiffness / size**2).tocsc(), 1, sigma=0.0)[0][0]
 
 
 @pytest.mark.parametrize(
@@ -167,7 +167,7 @@ def test_where_densities_meet_there_is_no_slit(ratio, bands):
 @pytest.mark.parametrize("ratio", [3, 6, 12])
 def test_there_are_no_slits_between_scan_lines(ratio, jitter):
     """All points at a boundary are within two lines of the sheet's own."""
-    along = int(np.sqrt(6_000 / ratio))
+    along = int(np.sqrt(3_000 / ratio))
     sides = np.linspace(-1.0, 1.0, along), np.linspace(-1.0, 1.0, along * ratio)
     points = np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 2)
     step = 2.0 / np.array([along, along * ratio])
