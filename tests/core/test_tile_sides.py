@@ -9,7 +9,7 @@ import core
 from benchmarks.samplings import fibonacci_sphere
 from benchmarks.surveys import agreed_on, survey
 
-COUNT = 900
+COUNT = 600
 SPHERE = fibonacci_sphere(COUNT)
 
 
@@ -59,11 +59,11 @@ def test_of_bodies_is_decided_one_by_one(tmp_path):
 
 
 def stored(folder, pieces, **choice):
-    return core.tiles.cut_to_store(lambda: pieces, folder / "store", 500, halo=20.0, **choice)
+    return core.tiles.cut_to_store(lambda: pieces, folder / "store", 350, halo=20.0, **choice)
 
 
 def test_by_scanners_is_told_by_the_files(tmp_path):
-    halves = [(SPHERE[rows], {"scanner": 0.1 * SPHERE[rows]}) for rows in (slice(400), slice(400, None))]
+    halves = [(SPHERE[rows], {"scanner": 0.1 * SPHERE[rows]}) for rows in (slice(250), slice(250, None))]
     store = stored(tmp_path, halves, orient="viewpoint")
     core.tiles.run_steps(store)
     for number in store.alive:

@@ -16,7 +16,7 @@ import core
 from benchmarks.samplings import fibonacci_sphere
 from core.tiles.medians import median
 
-LENGTH, RADIUS, COUNT = 12.0, 0.125, 3000
+LENGTH, RADIUS, COUNT = 12.0, 0.1, 2400
 
 
 @cache
@@ -50,7 +50,7 @@ def joined(store, name):
 @pytest.fixture(scope="module")
 def walk(tmp_path_factory):
     """A store after all steps, and what was told of the progress."""
-    store, told = stored(tmp_path_factory.mktemp("tiles"), rod(), 800, wavelength=0.0), []
+    store, told = stored(tmp_path_factory.mktemp("tiles"), rod(), 640, wavelength=0.0), []
     core.tiles.run_steps(store, progress=lambda *given: told.append(given))
     return store, told
 
@@ -82,7 +82,7 @@ class TestStore:
 
     def test_agrees_with_another_cut_of_points_in_another_order(self, measured, tmp_path):
         order = np.random.default_rng(0).permutation(COUNT)
-        other = stored(tmp_path, rod()[order], 1100, pieces=1)
+        other = stored(tmp_path, rod()[order], 880, pieces=1)
         core.tiles.run_steps(other)
         assert other.count == 3
         assert core.tiles.ROUGHNESS not in other.names("measure", 0)  # which was not asked for
@@ -137,7 +137,7 @@ core.tiles.run_steps(store)
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL there")
 def test_a_killed_walk_goes_on_to_the_same_bits(measured, tmp_path):
-    store = stored(tmp_path, rod(), 800)
+    store = stored(tmp_path, rod(), 640)
     root = Path(__file__).parents[2]
     for step in ("sheets", "agreed-patches"):  # while a tile tells, and while all agree
         died = subprocess.run([sys.executable, "-c", KILLED, store.folder, step], cwd=root)
@@ -154,7 +154,7 @@ def test_a_killed_walk_goes_on_to_the_same_bits(measured, tmp_path):
 
 class TestBrokenTiles:
     def test_are_told_and_the_others_done(self, tmp_path):
-        store = stored(tmp_path, rod(), 450)
+        store = stored(tmp_path, rod(), 360)
         end = np.argsort([store.own(number)[:, 0].mean() for number in range(store.count)])[-4:]
         away = [50.0, 0.0, 0.0]  # beyond all halos
         for number, points in zip(
@@ -203,17 +203,17 @@ class TestCut:
 
         def chunks():
             yield points[:1000], {"class": np.full(1000, 2, np.uint8), "lone": np.zeros(1000)}
-            yield points[1000:], {"class": np.full(2000, 300, np.uint16)}
+            yield points[1000:], {"class": np.full(1400, 300, np.uint16)}
 
-        store = core.tiles.cut_to_store(chunks, tmp_path / "store", 1600)
+        store = core.tiles.cut_to_store(chunks, tmp_path / "store", 1280)
         assert [list(store.columns(number)) for number in range(store.count)] == [["class"], ["class"]]
         counts = np.bincount(np.concatenate([store.columns(number)["class"] for number in range(2)]))
-        assert (counts[2], counts[300]) == (1000, 2000)
+        assert (counts[2], counts[300]) == (1000, 1400)
         assert store.manifest["columns left out"] == ["lone"]
 
     def test_finds_center_and_scale(self, tmp_path):
         points = rod() + [1e6, 0.0, 0.0]
-        store = stored(tmp_path, points, 800, pieces=7)
+        store = stored(tmp_path, points, 640, pieces=7)
         scaled = points - points.mean(axis=0)
         np.testing.assert_allclose(store.record["center"], points.mean(axis=0), rtol=0.0, atol=1e-9)
         np.testing.assert_allclose(store.record["scale"], np.sqrt((scaled**2).sum(axis=1).mean()), rtol=1e-12)
@@ -223,7 +223,7 @@ class TestCut:
             core.tiles.cut_to_store(lambda: [(rod(), {})], measured.folder, 100)
 
     def test_refuses_files_that_change(self, tmp_path):
-        counts = iter((3000, 2000))
+        counts = iter((2400, 2000))
         with pytest.raises(core.PointCloudError, match="when read again"):
             core.tiles.cut_to_store(lambda: [(rod()[: next(counts)], {})], tmp_path / "store", 800)
 
@@ -245,7 +245,7 @@ class TestCut:
         counts = []
         for workers, halo in [(1, 5.0), (2, 5.0), (8, 5.0), (8, 15.0)]:
             folder = tmp_path / f"{workers} {halo}"
-            store = core.tiles.cut_to_store(lambda: [(rod(), {})], folder, 1200, halo=halo, workers=workers)
+            store = core.tiles.cut_to_store(lambda: [(rod(), {})], folder, 960, halo=halo, workers=workers)
             counts.append(store.count)
         assert counts == [3, 4, 8, 3]  # at last they would be narrow against their halos
 

@@ -17,8 +17,8 @@ from core.files import PointTable, read_points, write_points
 from tests.core import e57_files
 from tests.core.copc_files import write_copc
 
-LENGTH, RADIUS, COUNT = 10.0, 0.25, 2400
-OPTIONS = ("--tile-points", 1300)
+LENGTH, RADIUS, COUNT = 10.0, 0.2, 1600
+OPTIONS = ("--tile-points", 900)
 
 
 @pytest.fixture
@@ -130,7 +130,8 @@ def test_choices_of_results(run, tmp_path):
     """The inner side, as seen from the middle, with roughness, at smoothed points."""
     rng = np.random.default_rng(1)
     angle, along = rng.uniform(0.0, 2.0 * np.pi, 1500), rng.uniform(0.0, LENGTH, 1500)
-    radius = RADIUS * (1.0 + 0.03 * rng.normal(size=1500))
+    middle = 0.25
+    radius = middle * (1.0 + 0.03 * rng.normal(size=1500))
     write_points(
         tmp_path / "a.ply", PointTable(np.column_stack([along, radius * np.cos(angle), radius * np.sin(angle)]))
     )
@@ -141,9 +142,9 @@ def test_choices_of_results(run, tmp_path):
     assert "long against the halos" in line["notices"][0]
     found = read_points(tmp_path / "all.ply")
     radial = np.hypot(*found.points.T[1:])
-    assert radial.std() < 0.02 * RADIUS
+    assert radial.std() < 0.02 * middle
     assert np.all(np.einsum("ij,ij->i", found.attributes["normal"], found.points * [0.0, 1.0, 1.0]) < 0.0)
-    assert np.median(found.attributes["lb_roughness"]) / -RADIUS == pytest.approx(1.0, abs=0.05)  # to the axis
+    assert np.median(found.attributes["lb_roughness"]) / -middle == pytest.approx(1.0, abs=0.05)  # to the axis
     assert [path.name for path in sorted(tmp_path.glob("out/tile*.ply"))] == [
         "tile_000000_smoothed.ply",
         "tile_000001_smoothed.ply",
@@ -273,7 +274,7 @@ class TestAgain:
         given = "tiles", "run", begun / "in", "--out-dir", begun / "out"
         code, [line] = run(*given, *OPTIONS)
         assert (code, line["tiles"], len(list((begun / "out").glob("tile_*.ply")))) == (0, 2, 2)
-        code, [line] = run(*given, "--tile-points", 700)
+        code, [line] = run(*given, "--tile-points", 450)
         assert (code, line["tiles"], line["points"]) == (0, 4, COUNT)
         assert "cut anew" in line["notices"][0]
         code, [line] = run(*given, *OPTIONS)
@@ -281,16 +282,16 @@ class TestAgain:
         assert run(*given)[1][0]["tiles"] == 2
 
     def test_more_memory_measures_what_failed_for_want_of_it(self, run, tmp_path):
-        write_points(tmp_path / "a.ply", PointTable(np.random.default_rng(1).random((6000, 3))))
-        given = "tiles", "run", tmp_path / "a.ply", "--out-dir", tmp_path / "out", "--tile-points", 3000
-        code, lines = run(*given, "--memory", "15MB")
+        write_points(tmp_path / "a.ply", PointTable(np.random.default_rng(1).random((3000, 3))))
+        given = "tiles", "run", tmp_path / "a.ply", "--out-dir", tmp_path / "out", "--tile-points", 1500
+        code, lines = run(*given, "--memory", "9MB")
         assert (code, "None of the tiles" in lines[0]["error"]) == (3, True)
         told = [json.loads(text)["error"] for text in (tmp_path / "out" / "tiles.jsonl").read_text().splitlines()]
         assert told
         assert all("allow more memory" in error for error in told)
-        assert run(*given, "--memory", "15MB")[0] == 3
+        assert run(*given, "--memory", "9MB")[0] == 3
         code, [line] = run(*given, "--memory", "4GB")
-        assert (code, line["failed_tiles"], line["measured_points"]) == (0, 0, 6000)
+        assert (code, line["failed_tiles"], line["measured_points"]) == (0, 0, 3000)
         before = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("*.np?")}
         code, [line] = run(*given, "--memory", "2GB")
         assert (code, line["notices"]) == (0, [])

@@ -15,8 +15,8 @@ from core.geometry.moments import least_error
 from core.tiles.cut import spacing_around
 from core.tiles.labels import agree_on_signs
 
-COUNT = 4000
-LENGTH, RADIUS = 12.0, 0.125  # of rods so long that tiles with halos are two thirds of them
+COUNT = 2800
+LENGTH, RADIUS = 12.0, 0.1  # of rods so long that tiles with halos are two thirds of them
 SPACING = np.sqrt(2.0 * np.pi * RADIUS * LENGTH / COUNT)
 KINDS = ("noisy", "several")
 
@@ -227,7 +227,7 @@ def test_curves_are_no_surface_in_tiles_either(tmp_path):
 
 def test_one_smoothing_length_is_that_of_the_whole(tmp_path):
     options = core.LaplacianOptions(bandwidth="global", neighbors=30, bandwidth_factor=0.5)
-    points = rods("several")[3000:]  # a quarter of the long one, and all else
+    points = rods("several")[COUNT * 3 // 4 :]  # a quarter of the long one, and all else
     laplacian = core.build_laplacian(points, options=options)
     store = survey(tmp_path / "store", points, 2, options=options)
     np.testing.assert_allclose(store.record["length"], laplacian.agreed.length, rtol=1e-12)
