@@ -22,7 +22,7 @@ MODES = [
 
 @functools.cache
 def sphere():
-    return core.build_laplacian(random_sphere(4000))
+    return core.build_laplacian(random_sphere(4000))  # of fewer it is not as close
 
 
 @functools.cache
@@ -32,7 +32,7 @@ def long_bar():
 
 @functools.cache
 def strip():
-    return core.build_laplacian(strip_points(3000))
+    return core.build_laplacian(strip_points(2400))
 
 
 def caps():

@@ -135,7 +135,7 @@ class TestMeasure:
         assert (code, text in line["error"], str(source) in line["error"]) == (1, True, True)
 
     def test_volumes_over_a_plane_and_over_another_cloud(self, run, tmp_path):
-        places = np.random.default_rng(1).uniform(-1.6, 1.6, (2, 2500, 2))
+        places = np.random.default_rng(1).uniform(-1.6, 1.6, (2, 1500, 2))
         heap, ground = (np.column_stack([xy, 0.0 * xy[:, 0]]) for xy in places)
         heap[:, 2] = np.maximum(0.5 * (1.0 - np.hypot(*heap[:, :2].T)), 0.0)
         far = FAR + [7.0, 0.0, 0.0]
@@ -273,7 +273,7 @@ class TestCompare:
 
     def test_a_sign_in_doubt_is_told_until_a_side_is_chosen(self, run, tmp_path):
         rng = np.random.default_rng(3)
-        walls = [np.column_stack([np.full(900, x), *rng.uniform(-1.0, 1.0, (2, 900))]) for x in (0.0, 0.1)]
+        walls = [np.column_stack([np.full(500, x), *rng.uniform(-1.0, 1.0, (2, 500))]) for x in (0.0, 0.1)]
         plan, source = (write(tmp_path / f"{name}.ply", wall) for name, wall in zip(("plan", "a"), walls, strict=True))
 
         def compared(source, plan, *more):

@@ -162,7 +162,7 @@ def bush(seed=1):
 
 
 def dense_and_sparse():
-    dense, sparse = fibonacci_sphere(30_000), fibonacci_sphere(600)
+    dense, sparse = fibonacci_sphere(12_000), fibonacci_sphere(240)
     return np.concatenate([half(dense), sparse[sparse[:, 2] <= 0.0]])
 
 

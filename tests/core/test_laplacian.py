@@ -54,7 +54,7 @@ class TestPaper:
     @pytest.fixture(scope="class")
     @classmethod
     def errors(cls):
-        points = icosahedral_sphere(28)
+        points = icosahedral_sphere(28)  # the paper's
         assert len(points) == 7842
         laplacian = core.paper.build_laplacian(points)
         return sphere_errors(laplacian), laplacian.areas.sum()

@@ -57,8 +57,8 @@ def test_heat_keeps_its_total_on_each_component_and_its_range(step):
 
 
 def test_heat_keeps_its_total_over_a_thousand_steps():
-    laplacian = sphere()
-    heat, values = core.motion.Heat(laplacian, 0.3 * spacing(laplacian) ** 2), RNG.random(800)
+    laplacian = sphere(300)
+    heat, values = core.motion.Heat(laplacian, 0.3 * spacing(laplacian) ** 2), RNG.random(300)
     total = laplacian.areas @ values
     for _ in range(1000):
         values = heat.advance(values)
@@ -149,8 +149,8 @@ def test_a_push_moves_all_points_as_far(step):
 
 
 def test_waves_keep_their_energy_over_a_thousand_steps():
-    wave = core.motion.Wave(sphere(), spacing(sphere()))
-    state = np.stack([RNG.random(800), RNG.random(800)], axis=1)
+    wave = core.motion.Wave(sphere(300), spacing(sphere(300)))
+    state = np.stack([RNG.random(300), RNG.random(300)], axis=1)
     energy = wave.energy(state)
     for _ in range(1000):
         state = wave.advance(state)
@@ -403,7 +403,7 @@ def test_patterns_have_the_size_that_was_asked_for(pattern):
     near = laplacian.points @ laplacian.points[400] > np.cos(0.4 * size)
     reaction = core.motion.ReactionDiffusion.of_pattern(laplacian, 5.0, pattern, size)
     state = core.motion.Mixture(1.0 - near, 1.0 * near)
-    for _ in range(500):
+    for _ in range(300):
         state = reaction.advance(state)
     ripple = state.eater - laplacian.areas @ state.eater / laplacian.areas.sum()
     square = ripple @ (laplacian.stiffness @ ripple) / (laplacian.areas @ ripple**2)

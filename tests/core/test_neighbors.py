@@ -82,7 +82,7 @@ def test_global_length_is_the_mean_distance_to_the_hundredth_neighbor():
 
 
 def test_local_length_follows_the_spacing():
-    points = uneven_sphere(4000)
+    points = uneven_sphere(2000)
     cloud = read_cloud(points, LaplacianOptions(bandwidth="local"))
     lengths = cloud.scaled.scatter(cloud.pairs.lengths, 0.0)
     dense, coarse = lengths[points[:, 2] > 0.6].mean(), lengths[points[:, 2] < -0.6].mean()

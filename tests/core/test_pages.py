@@ -66,7 +66,7 @@ def test_no_page_installs_a_name_that_is_not_published():
 @by_name("meshfree")
 def test_program(snippet, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    points = fibonacci_sphere(800)
+    points = fibonacci_sphere(400)
     for folder in ("scans", "thin/reports"):
         Path(folder).mkdir(parents=True)
     for name in ("scan.ply", "scans/a.ply", "scans/b.ply"):
@@ -74,7 +74,7 @@ def test_program(snippet, tmp_path, monkeypatch):
     if " report " in snippet.text:
         run(["info", "scan.ply", "--report", "thin/reports/1.jsonl"], verbs.make_verbs(), "meshfree")
     if re.search(r" tiles (survey|agree|measure|modes|report) | report out$", snippet.text):
-        run(["tiles", "run", "scans", "--out-dir", "out", "--tile-points", "900"], verbs.make_verbs(), "meshfree")
+        run(["tiles", "run", "scans", "--out-dir", "out", "--tile-points", "450"], verbs.make_verbs(), "meshfree")
     assert run(shlex.split(snippet.text)[1:], verbs.make_verbs(), "meshfree") == 0
 
 

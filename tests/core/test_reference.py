@@ -89,7 +89,7 @@ class TestUnsymmetrizedOperator:
 
     def test_error_is_of_second_order(self):
         errors = []
-        for count in (2000, 8000):
+        for count in (2000, 8000):  # the fewest with such an error
             matrix, x = eq_5_on_the_sphere(count)
             errors.append(np.linalg.norm(matrix @ x + 2.0 * x) / np.linalg.norm(2.0 * x))
         assert errors[1] < 0.03

@@ -9,7 +9,7 @@ from core.geometry.nearest import find_nearest
 from core.geometry.rows import look_across_rows
 
 
-def rings(count=12, sides=600):
+def rings(count=8, sides=600):
     """A plane as a turning lidar sees it, and its area: rings 8 to 19 times as far apart as their points."""
     radius = 10.0 * 1.15 ** np.arange(count)
     angle = np.arange(sides) * 2.0 * np.pi / sides
@@ -18,7 +18,7 @@ def rings(count=12, sides=600):
     return np.concatenate([flat.reshape(-1, 2), np.zeros((count * sides, 1))], axis=1), area
 
 
-def torus_of_circles(circles=30, sides=170):
+def torus_of_circles(circles=24, sides=136):
     """A torus in circles that are fourteen times as far apart as their points."""
     u, v = np.meshgrid(np.arange(circles) * 2.0 * np.pi / circles, np.arange(sides) * 2.0 * np.pi / sides)
     radius = 1.0 + 0.4 * np.cos(v)
@@ -60,7 +60,7 @@ def test_circles_that_come_nearer_to_each_other_are_measured(minor):
     exact = np.repeat(4.0 * np.pi**2 * minor * radius / (40 * 160), 40)
     np.testing.assert_allclose(laplacian.areas / exact, 1.0, atol=0.15)
     values = laplacian.eigenpairs(21).eigenvalues[1:] / torus_eigenvalues(21, 1.0, minor)[1:]
-    assert np.abs(values - 1.0).mean() < 6e-3
+    assert np.abs(values - 1.0).mean() < 6e-3  # in fewer points they are not as close
 
 
 @pytest.mark.parametrize("across", [7, 8, 9, 9.7, 10])
@@ -95,9 +95,9 @@ def test_normals_where_only_two_rows_are_near(across, radius):
 
 def test_eigenvalues_of_a_rectangle_in_rows():
     # They are twenty times as far apart as their points, and leave the last gap of the unit square out.
-    points = grid_points(np.arange(600) / 600.0, np.arange(30) / 30.0, [0.0])
+    points = grid_points(np.arange(300) / 300.0, np.arange(15) / 15.0, [0.0])
     values = core.build_laplacian(points).eigenpairs(6).eigenvalues
-    exact = np.sort([(i * i + (j * 30.0 / 29.0) ** 2) * np.pi**2 for i in range(4) for j in range(4)])[1:6]
+    exact = np.sort([(i * i + (j * 15.0 / 14.0) ** 2) * np.pi**2 for i in range(4) for j in range(4)])[1:6]
     np.testing.assert_allclose(values[1:], exact, rtol=3e-2)
 
 

@@ -112,13 +112,13 @@ def _grid(size, spacing=1.0):
 @pytest.mark.parametrize(
     "points",
     [
-        np.column_stack([_grid(50), np.zeros(2500)]),
-        np.stack(np.meshgrid(*[np.arange(13.0)] * 3), axis=-1).reshape(-1, 3),
-        np.random.default_rng(0).integers(0, 15, (3000, 3)),
-        np.repeat(np.random.default_rng(0).random((800, 3)), 3, axis=0),
-        np.column_stack([_grid(50, 20.0), np.zeros(2500)]),
-        np.column_stack([np.tile(_grid(25), (4, 1)), np.repeat(np.arange(4.0), 625) * 1e-3]),
-        np.random.default_rng(0).random((2500, 3)),
+        np.column_stack([_grid(32), np.zeros(1024)]),
+        np.stack(np.meshgrid(*[np.arange(10.0)] * 3), axis=-1).reshape(-1, 3),
+        np.random.default_rng(0).integers(0, 11, (1200, 3)),
+        np.repeat(np.random.default_rng(0).random((350, 3)), 3, axis=0),
+        np.column_stack([_grid(32, 20.0), np.zeros(1024)]),
+        np.column_stack([np.tile(_grid(16), (4, 1)), np.repeat(np.arange(4.0), 256) * 1e-3]),
+        np.random.default_rng(0).random((1000, 3)),
     ],
     ids=["grid", "lattice", "integers", "duplicates", "lines", "stacked", "random"],
 )
