@@ -8,14 +8,14 @@ import core
 from core.tiles.site import Site
 
 
-def survey(folder, points, count, halo=core.tiles.HALO, options=None, **choice):
-    """Cut points into so many tiles on disk, and take all steps up to what they agree on; return the store."""
+def survey(folder, points, count, halo=core.tiles.HALO, options=None, until="measure", **choice):
+    """Cut points into so many tiles on disk, and take all steps before one; return the store."""
     columns = {"row": np.arange(len(points)), **choice.pop("columns", {})}
     most = -(-len(points) // count)
     store = core.tiles.cut_to_store(
         lambda: [(points, columns)], folder, most, options or core.LaplacianOptions(), halo=halo, **choice
     )
-    while (waiting := core.tiles.pending(store))[0].name != "measure":
+    while (waiting := core.tiles.pending(store))[0].name != until:
         for number in waiting[1]:
             core.tiles.visit_tile(store.folder, waiting[0].name, number)
         core.tiles.settle(store)

@@ -113,7 +113,7 @@ def test_tiles_agree_on_the_direction(tmp_path):
     quiet = level @ _TURNED[:, 0] < -0.003
     points[quiet] = level[quiet]
     whole = core.build_laplacian(points)
-    rounded = survey(tmp_path / "narrow", points, 8, 5.0)
+    rounded = survey(tmp_path / "narrow", points, 8, 5.0, until="spacing")
     parts = [rounded.part(number).points for number in range(rounded.count)]
     assert not all(find_rounding(cKDTree(part)).any() for part in parts)
     assert abs(rounded.record["rounded"] @ _TURNED[:, 2]) > 0.8

@@ -21,7 +21,7 @@ def sheet():
 
 
 def sides(folder, points, count, **choice):
-    return agreed_on(survey(folder, points, count, 20.0, **choice)).side
+    return agreed_on(survey(folder, points, count, 20.0, until="areas", **choice)).side
 
 
 SPHERES = {

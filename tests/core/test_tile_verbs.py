@@ -282,16 +282,16 @@ class TestAgain:
         assert run(*given)[1][0]["tiles"] == 2
 
     def test_more_memory_measures_what_failed_for_want_of_it(self, run, tmp_path):
-        write_points(tmp_path / "a.ply", PointTable(np.random.default_rng(1).random((3000, 3))))
-        given = "tiles", "run", tmp_path / "a.ply", "--out-dir", tmp_path / "out", "--tile-points", 1500
-        code, lines = run(*given, "--memory", "9MB")
+        write_points(tmp_path / "a.ply", PointTable(np.random.default_rng(1).random((2000, 3))))
+        given = "tiles", "run", tmp_path / "a.ply", "--out-dir", tmp_path / "out", "--tile-points", 1000
+        code, lines = run(*given, "--memory", "6MB")
         assert (code, "None of the tiles" in lines[0]["error"]) == (3, True)
         told = [json.loads(text)["error"] for text in (tmp_path / "out" / "tiles.jsonl").read_text().splitlines()]
         assert told
         assert all("allow more memory" in error for error in told)
-        assert run(*given, "--memory", "9MB")[0] == 3
+        assert run(*given, "--memory", "6MB")[0] == 3
         code, [line] = run(*given, "--memory", "4GB")
-        assert (code, line["failed_tiles"], line["measured_points"]) == (0, 0, 3000)
+        assert (code, line["failed_tiles"], line["measured_points"]) == (0, 0, 2000)
         before = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("*.np?")}
         code, [line] = run(*given, "--memory", "2GB")
         assert (code, line["notices"]) == (0, [])

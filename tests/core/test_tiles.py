@@ -118,7 +118,7 @@ class TestTiles:
 
     def test_have_halos_of_the_points_near_their_own(self, tmp_path):
         points, halo = rods("several"), 10.0
-        store = survey(tmp_path / "store", points, 4, halo)
+        store = survey(tmp_path / "store", points, 4, halo, until="areas")
         spacing = np.empty(len(points))
         rows = [store.columns(number)["row"] for number in range(store.count)]
         for own in rows:
@@ -202,7 +202,9 @@ def test_points_that_fill_volumes_are_judged_alike_however_the_cloud_is_cut(tmp_
         size * rng.normal(size=(400, 3)) + place for size, place in ((0.8, [8.0, 5.0, 6.0]), (1.4, [30.0, 5.0, 6.0]))
     ]
     points = np.concatenate([ground, *leaves])
-    first, second = (survey(tmp_path / str(count), points, count, 6.0).record["filling"] for count in (2, 5))
+    first, second = (
+        survey(tmp_path / str(count), points, count, 6.0, until="sheets").record["filling"] for count in (2, 5)
+    )
     assert first[0] > 0.4  # of the spacing
     np.testing.assert_allclose(first, second, rtol=1e-9)
 
@@ -211,7 +213,7 @@ def test_sides_where_sheets_come_close_are_those_of_the_whole(tmp_path):
     rng = np.random.default_rng(1)
     along, angle = rng.uniform(0.0, LENGTH, 3000), rng.uniform(0.0, 2.0 * np.pi, 3000)
     points = np.column_stack([along, 0.25 * np.cos(angle), 0.05 * np.sin(angle)])  # a flat tube
-    found = agreed_on(survey(tmp_path / "store", points, 4)).side
+    found = agreed_on(survey(tmp_path / "store", points, 4, until="areas")).side
     wanted = core.build_laplacian(points).agreed
     on = wanted.side.any(axis=1)
     assert np.mean(on) > 0.99
