@@ -25,7 +25,7 @@ def two_spheres():
     return np.concatenate([random_sphere(2000), (1.0 + gap) * random_sphere(2000, 1)])
 
 
-CLOUDS = {
+CLOUDS = {  # on fewer points other causes weigh as much
     Doubt.FEW: lambda: box([1.0, 1.0, 1.0], 300),
     Doubt.VOLUME: ball,
     Doubt.NOISE: lambda: noisy_sphere(4000, 1.2),

@@ -19,10 +19,14 @@ FRONT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
 
 @functools.cache
+def bar_operator():
+    return core.build_laplacian(bar(12, 48)[0])
+
+
+@functools.cache
 def bound_bar():
-    """The points of a bar, its splats, and what deforms them."""
-    points = bar(12, 48)[0]
-    laplacian = core.build_laplacian(points)
+    """The splats of a bar, and what deforms them."""
+    laplacian, points = bar_operator(), bar_operator().points
     reach = 2.5 * LENGTH / 48
     fixed, moved = np.flatnonzero(points[:, 0] < reach), np.flatnonzero(points[:, 0] > LENGTH - reach)
     return splats_on(laplacian), core.deform.Deformer(laplacian, moved, fixed)
@@ -115,9 +119,8 @@ def test_points_of_no_surface_stay_with_a_surface_that_stays():
 def test_rigid_handles_turn_covariances_and_harmonics(count):
     splats, deformer = bound_bar()
     points, handles = deformer.points, np.concatenate([deformer.handles, deformer.anchors])
-    laplacian = core.build_laplacian(points)
     kind = core.deform.Deformer if count is None else functools.partial(core.deform.coarse_deformer, count=count)
-    free = kind(laplacian, handles)
+    free = kind(bar_operator(), handles)
     moved = free.solve(points[free.handles] @ TURN.T + [1.0, 2.0, 3.0])
     found = splats.deformed(moved, free.gradients(moved))
     np.testing.assert_allclose(found.covariances, TURN @ splats.covariances @ TURN.T, atol=1e-5 * 0.01)
