@@ -93,11 +93,11 @@ def heap(count, half=1.6, seed=2):
 
 
 @functools.cache
-def heap_within(count, most, scale=1.0):
+def heap_within(count, most):
     """The operator of the points of a heap up to so far from its axis, and which of them are the heap's."""
     points = heap(count)
     far = np.hypot(*points[:, :2].T)
-    return core.build_laplacian(scale * points[far < most]), far[far < most] < 1.05
+    return core.build_laplacian(points[far < most]), far[far < most] < 1.05
 
 
 @functools.cache
