@@ -62,14 +62,14 @@ def slit_eigenvalue(half, deep=0.75, cells=200):
 @pytest.mark.parametrize(
     ("kind", "count", "wide", "seed"),
     [
-        ("random", 6_000, 4.0, 1),
-        ("random", 6_000, 6.0, 2),
-        ("random", 6_000, 9.0, 3),
+        ("random", 4_000, 4.0, 1),
+        ("random", 4_000, 6.0, 2),
+        ("random", 4_000, 9.0, 3),
         ("uneven", 4_000, 4.0, 1),
         ("uneven", 4_000, 12.0, 11),
-        ("grid", 4_000, 4.0, 0),
-        ("grid", 4_000, 7.0, 0),
-        ("grid", 4_000, 12.0, 0),
+        ("grid", 2_500, 4.0, 0),
+        ("grid", 2_500, 7.0, 0),
+        ("grid", 4_000, 12.0, 0),  # wide, and coarser in fewer points
     ],
 )
 def test_a_slit_of_four_spacings_and_more_is_a_boundary(kind, count, wide, seed):
@@ -82,17 +82,17 @@ def test_a_slit_of_four_spacings_and_more_is_a_boundary(kind, count, wide, seed)
 
 def test_a_slit_on_a_bent_noisy_sheet_in_millimetres_is_a_boundary():
     """Rolled up, the sheet is the same within itself."""
-    flat, half = slit_square("random", 8_000, 6.0, 4)
+    flat, half = slit_square("random", 5_000, 6.0, 4)
     bent = np.column_stack([np.sin(flat[:, 0]), flat[:, 1], np.cos(flat[:, 0])])
-    bent += 0.05 * (2.0 / np.sqrt(8_000)) * np.random.default_rng(0).standard_normal(bent.shape)
+    bent += 0.05 * (2.0 / np.sqrt(5_000)) * np.random.default_rng(0).standard_normal(bent.shape)
     found = core.build_laplacian(1000.0 * bent).eigenpairs(2).eigenvalues[1]
     assert 1e6 * found == pytest.approx(slit_eigenvalue(half), rel=0.1)
 
 
 def test_a_slit_within_a_sheet_is_a_boundary():
     """Heat goes around it: of the square [-1, 1]^2 with a wall at x = 0, |y| < .6, fields odd in x change there."""
-    points, half = slit_square("random", 12_000, 5.0, 6, deep=1.0)
-    fill = np.random.default_rng(7).uniform(-1.0, 1.0, (12_000, 2))
+    points, half = slit_square("random", 8_000, 5.0, 6, deep=1.0)
+    fill = np.random.default_rng(7).uniform(-1.0, 1.0, (8_000, 2))
     fill = fill[(np.abs(fill[:, 0]) < half) & (np.abs(fill[:, 1]) > 0.6)]
     points = np.concatenate([points, np.column_stack([fill, np.zeros(len(fill))])])
     laplacian = core.build_laplacian(points)
@@ -107,8 +107,8 @@ def test_a_slit_within_a_sheet_is_a_boundary():
 
 def test_sheets_side_by_side_have_the_eigenvalues_of_both():
     """Two of 1 x 2, four spacings apart: each value of one sheet twice."""
-    points = np.random.default_rng(1).uniform(-1.0, 1.0, (8_000, 2))
-    points[:, 0] += np.where(points[:, 0] > 0.0, 2.0, -2.0) * 2.0 / np.sqrt(8_000)
+    points = np.random.default_rng(1).uniform(-1.0, 1.0, (5_000, 2))
+    points[:, 0] += np.where(points[:, 0] > 0.0, 2.0, -2.0) * 2.0 / np.sqrt(5_000)
     laplacian = core.build_laplacian(np.column_stack([points, np.zeros(len(points))]))
     exact = np.repeat(np.sort((np.pi**2 * (np.arange(4.0)[:, None] ** 2 + np.arange(6) ** 2 / 4.0)).ravel()), 2)
     found = laplacian.eigenpairs(10).eigenvalues
