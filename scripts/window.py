@@ -33,6 +33,7 @@ SIZE = (1280, 800)
 START = 120  # seconds that Blender may take to start on a busy machine
 DRAWING = 240  # seconds that it may take to draw, when shaders for a graphics card are compiled for the processor
 NOTICES = 6  # row of the sidebar with the notices of a cloud
+_DOUBLE = 0.5  # seconds: within 350 ms, Blender's default, two presses of a key are a double click
 _BUTTON = 16  # pixels, less than a button is high: none is passed over
 _BUTTONS = {"left": 1, "middle": 2, "right": 3, "wheel up": 4, "wheel down": 5}
 
@@ -57,6 +58,7 @@ class Window:
     def __init__(self, place, archive=None, pictures=PICTURES):
         self.place, self.archive, self.pictures = place, archive, pictures
         self._screen = self._blender = None
+        self._pressed = {}  # when each key was
         self.open()
 
     def open(self):
@@ -216,8 +218,14 @@ class Window:
         self.settle()
 
     def key(self, *names):
-        """Press keys one after the other, by the names of X: "g", "Return", "Escape", "ctrl+z", "KP_1"."""
+        """Press keys one after the other, by the names of X: "g", "Return", "Escape", "ctrl+z", "KP_1".
+
+        A key that was pressed just before waits: Blender would take both for a double click, which A knows.
+        """
+        keys = [name.rpartition("+")[2] for name in names]
+        time.sleep(max(self._pressed.get(keys[0], 0.0) + _DOUBLE - time.monotonic(), 0.0))
         self._xdotool("key", "--delay", "30", *names)
+        self._pressed |= dict.fromkeys(keys, time.monotonic())
 
     def type(self, text):
         """Type a text."""
