@@ -2,7 +2,7 @@
 
 import bpy
 
-from ..operators.objects.attributes import DISC, mode_number
+from ..operators.objects.attributes import DISC, STORABLE, mode_number
 from ..operators.objects.colors import own_colors, own_material, shows_own_material
 from ..operators.objects.modifiers import has_input, input_property
 from ..operators.objects.reading import obstacle
@@ -48,6 +48,8 @@ class MESHFREE_MT_results(bpy.types.Menu):
             layout.separator()
         if eigenvector_name(1) in attributes:
             layout.menu("MESHFREE_MT_modes")
+        if _other_attributes(obj.data):
+            layout.menu("MESHFREE_MT_attributes")
         if RESULTS[0] not in attributes:
             layout.label(text="More come with Analyze Points and other tools")
 
@@ -62,6 +64,30 @@ class MESHFREE_MT_modes(bpy.types.Menu):
         grid = self.layout.grid_flow(columns=1 + len(names) // 20)
         for name in names:
             _draw_choice(grid, label(name), name, shown_attribute(context.object))
+
+
+class MESHFREE_MT_attributes(bpy.types.Menu):
+    """Other numbers of the points that can be shown as colors, such as classes and intensities of a laser scan"""
+
+    bl_label = "Attributes"
+    bl_options = {"SEARCH_ON_KEY_PRESS"}
+
+    def draw(self, context):
+        obj = context.object
+        for name in _other_attributes(obj.data):
+            _draw_choice(self.layout, name, name, shown_attribute(obj))
+
+
+def _other_attributes(data) -> list[str]:
+    """Names of the numbers and vectors of points that neither Blender nor this extension made."""
+    return [
+        attribute.name
+        for attribute in data.attributes
+        if attribute.domain == "POINT"
+        and attribute.data_type in STORABLE
+        and not attribute.name.startswith((".", "lb_"))
+        and not attribute.is_required
+    ]
 
 
 def _draw_choice(layout, text, name, shown):
@@ -184,4 +210,10 @@ def _draw_legend(layout, context, obj):
 
 
 _PARTS = {"Range and Lines": _draw_range, "Points": _draw_points, "Legend": _draw_legend}
-CLASSES = (MESHFREE_MT_results, MESHFREE_MT_modes, MESHFREE_PT_display, MESHFREE_PT_display_properties)
+CLASSES = (
+    MESHFREE_MT_results,
+    MESHFREE_MT_modes,
+    MESHFREE_MT_attributes,
+    MESHFREE_PT_display,
+    MESHFREE_PT_display_properties,
+)

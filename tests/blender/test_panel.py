@@ -72,7 +72,7 @@ class Layout:
     def menu(self, idname, text=""):
         menu = getattr(bpy.types, idname)
         self.texts.append(text or menu.bl_label)
-        if idname in {"MESHFREE_MT_results", "MESHFREE_MT_modes"}:
+        if idname in {"MESHFREE_MT_results", "MESHFREE_MT_modes", "MESHFREE_MT_attributes"}:
             menu.draw(SimpleNamespace(layout=self), bpy.context)
 
     def context_pointer_set(self, name, data):
@@ -168,6 +168,20 @@ def test_the_area_that_can_be_trusted_stands_beside_the_total(capfd):
         texts = draw()
         assert "Total Area" in texts
         assert ("Trusted Area" in texts) == told
+
+
+def test_the_list_of_results_ends_with_other_numbers_of_the_points():
+    obj = add_object(sphere_points())
+    assert "Attributes" not in draw()
+    made = {"classification": "INT", "velocity": "FLOAT_VECTOR", "paint": "FLOAT_COLOR", ".hidden": "FLOAT"}
+    for name, kind in made.items():
+        obj.data.attributes.new(name, kind, "POINT")
+    bpy.ops.meshfree.analyze()
+    buttons = []
+    texts = draw(buttons=buttons)
+    assert texts.index("Attributes") > texts.index("Mean Curvature")
+    offered = [settings.attribute for idname, settings in buttons if idname == "meshfree.colormap"]
+    assert [name for name in offered if name in made] == ["paint", "classification", "velocity"]  # its own colors first
 
 
 def test_panel_without_object_says_what_to_do():
