@@ -18,5 +18,5 @@ from .factors import dissect, sparsify
 from .lanczos import lift_lowest
 from .rotations import TRACE, nearest_rotations, rotations_in_groups
 from .rows import Rows
-from .solvers import Iterate, bounded_quadratic, conjugate_gradients, solve_columns, solve_symmetric
+from .solvers import Iterate, bounded_quadratic, conjugate_gradients, multigrid, solve_columns, solve_symmetric
 from .two_grid import TwoGrid

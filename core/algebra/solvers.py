@@ -1,13 +1,15 @@
 """Conjugate gradients: for symmetric equations, and for symmetric quadratics with lower bounds."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 from scipy import sparse
+from scipy.sparse.linalg import LinearOperator
 
 from ..cores import cores
 from ..errors import SolverError
@@ -92,6 +94,16 @@ def conjugate_gradients(
         residual -= length * image
     left = float(np.max(size(residual) / unit, initial=0.0))
     return Iterate(values, products, left <= rtol, left)
+
+
+@contextmanager
+def multigrid(matrix: sparse.csr_array) -> Iterator[LinearOperator | None]:
+    """Take an approximate inverse of a positive semi-definite matrix, (m, m), for solutions within this context.
+
+    None where unknowns are so few that the diagonal alone is faster, or where coarse versions do not help.
+    """
+    with ThreadPoolExecutor(cores()) as pool:
+        yield approximate_inverse(matrix, pool, lambda: None) if matrix.shape[0] >= _FEW else None
 
 
 def solve_symmetric(

@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
+from scipy.sparse.linalg import LinearOperator
 from scipy.spatial import cKDTree
 
-from ..algebra import Iterate, conjugate_gradients
+from ..algebra import Iterate, conjugate_gradients, multigrid
 from ..arguments import real, whole
 from ..errors import Cancelled, InvalidPointsError, NotASurfaceError, PointCloudError
 from ..frozen import Frozen
@@ -301,14 +302,15 @@ class _Film:
         stiffness = stiffness[free][:, free]
         force = np.einsum("ic,ic->i", normals, pulled)
         jacobi = (stiffness - sparse.diags_array(areas * curvature**2)).tocsr()
-        newton = _solve(jacobi, force)
-        along, definite = newton.values, newton.definite
         step = np.zeros_like(points)
-        if definite and np.max(np.abs(along) * curvature) <= _LONGEST:
-            step[free] = along[:, None] * normals
-        else:
-            for axis in range(3):
-                step[free, axis] = _solve(stiffness, pulled[:, axis]).values
+        with multigrid(stiffness) as inverse:
+            newton = _solve(jacobi, force, inverse)
+            along, definite = newton.values, newton.definite
+            if definite and np.max(np.abs(along) * curvature) <= _LONGEST:
+                step[free] = along[:, None] * normals
+            else:
+                for axis in range(3):
+                    step[free, axis] = _solve(stiffness, pulled[:, axis], inverse).values
         few = min(_FEW, len(free))
         return _State(
             points=points,
@@ -374,9 +376,10 @@ def _boundary_points(laplacian: LaplaceBeltrami, fixed: Bools) -> Ints:
     return rows if np.median(lopsided) > 0.5 else rows[:0]
 
 
-def _solve(matrix: sparse.csr_array, load: Floats) -> Iterate:
+def _solve(matrix: sparse.csr_array, load: Floats, inverse: LinearOperator | None) -> Iterate:
     """Solve for a step, no more closely than it needs, or find that the matrix is not definite."""
     diagonal = matrix.diagonal()
     if not np.all(diagonal > 0.0):
         return Iterate(np.zeros_like(load), 0, converged=False, residual=1.0, definite=False)
-    return conjugate_gradients(matrix, load, scaling=1.0 / diagonal, rtol=_RTOL, products=_PRODUCTS)
+    scaling = 1.0 / diagonal if inverse is None else inverse
+    return conjugate_gradients(matrix, load, scaling=scaling, rtol=_RTOL, products=_PRODUCTS)
