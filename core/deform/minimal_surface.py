@@ -252,7 +252,8 @@ class _State:
     # Area that Newton's step would save if the area were quadratic; infinite where that step was not found
     savings: float
     definite: bool  # whether the Jacobi operator is
-    curved: float  # greatest smoothing length times curvature, but for a few points
+    # Greatest smoothing length times curvature, but for a few points, and those that couple with fixed ones
+    curved: float
 
     def rises_by_noise(self, before: "_State", epsilon: float) -> bool:
         """Whether Newton's step to it, which was to save less than a share of the area, saved none, nor left less."""
@@ -311,7 +312,9 @@ class _Film:
             else:
                 for axis in range(3):
                     step[free, axis] = _solve(stiffness, pulled[:, axis], inverse).values
-        few = min(_FEW, len(free))
+        # Where it meets fixed parts of another slope an edge is sharp, however many points there are.
+        held = laplacian.stiffness @ np.isin(np.arange(len(points)), self.free, invert=True) != 0.0
+        bent = np.append(np.zeros(_FEW), (curvature * laplacian.smoothing_lengths[free])[~held[free]])
         return _State(
             points=points,
             laplacian=laplacian,
@@ -319,7 +322,7 @@ class _Film:
             step=step,
             savings=0.5 * float(along @ force) if newton.converged else np.inf,
             definite=definite,
-            curved=float(np.partition(curvature * laplacian.smoothing_lengths[free], -few)[-few]),
+            curved=float(np.partition(bent, -_FEW)[-_FEW]),
         )
 
     def advance(self, before: _State, limit: float) -> tuple[_State, str]:

@@ -1,5 +1,6 @@
 """Minimal surfaces: known ones, boundaries that none spans, and the ways to end."""
 
+import importlib
 import sys
 
 import numpy as np
@@ -9,6 +10,8 @@ import core
 from benchmarks.plateau import cap, catenoid, catenoid_errors, helicoid, tube
 from benchmarks.samplings import fibonacci_sphere, grid_points, hemisphere_random, random_sphere, square_grid
 from core.deform.boundary_curve import BoundaryCurve
+
+iteration = importlib.import_module("core.deform.minimal_surface")  # the function has the same name
 
 
 @pytest.fixture(scope="module")
@@ -84,6 +87,21 @@ class TestCatenoid:
         film = core.deform.minimal_surface(points, fixed)
         assert film.converged
         assert catenoid_errors(film.points, film.areas)[2] < 1e-2
+
+
+def test_an_edge_at_fixed_points_is_no_neck():
+    """A catenoid between fixed cylinders, which it meets at an angle: more points resolve it better and better."""
+
+    def curved(count):
+        rng = np.random.default_rng(0)
+        z, angle = rng.uniform(-0.6, 0.6, count), rng.uniform(0.0, 2.0 * np.pi, count)
+        radius = 0.5 * np.cosh(np.minimum(np.abs(z), 0.4) / 0.5)
+        points = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), z])
+        laplacian = core.build_laplacian(points)
+        film = iteration._Film(laplacian, np.abs(z) > 0.4, laplacian.options, None)
+        return film.state(points, laplacian).curved
+
+    assert curved(6000) < 0.75 * curved(1500) < 0.3
 
 
 class TestFlat:
