@@ -25,8 +25,7 @@ class Rows:
 
     def __init__(self, matrix: sparse.csr_array, pool: ThreadPoolExecutor, report: Report) -> None:
         self._map, self._report, self._count, self._dtype = pool.map, report, matrix.shape[0], matrix.dtype
-        size = min(max(matrix.nnz // cores() + 1, _LEAST), PART)
-        starts = np.append(np.arange(0, max(matrix.nnz, 1), size), matrix.nnz)
+        starts = np.append(np.arange(0, max(matrix.nnz, 1), part_size(matrix.nnz)), matrix.nnz)
         cuts = np.unique(np.append(np.searchsorted(matrix.indptr[:-1], starts[:-1]), matrix.shape[0]))
         self._slices = [slice(first, last) for first, last in pairwise(cuts)]
         self._parts = []
@@ -61,3 +60,8 @@ class Rows:
         for result in self._map(function, self._slices, self._parts):
             self._report()
             yield result
+
+
+def part_size(entries: int) -> int:
+    """Return how many of a matrix's entries are multiplied at once."""
+    return min(max(entries // cores() + 1, _LEAST), PART)

@@ -15,7 +15,7 @@ from ..cores import cores
 from ..errors import SolverError
 from ..types import Array, Floats, Progress
 from .hierarchy import approximate_inverse
-from .rows import PART, Rows
+from .rows import Rows, part_size
 
 _STEPS = 20_000  # of `solve_symmetric`, at most
 _FEW = 20_000  # unknowns up to which multigrid, whose set-up costs 120 to 150 steps, does not pay
@@ -146,7 +146,7 @@ def solve_symmetric(
         if step % 20 == 0:
             count(20.0)
 
-    part = min(1.0, PART / max(matrix.nnz, 1))  # of a product, after which there is a report
+    part = min(1.0, part_size(matrix.nnz) / max(matrix.nnz, 1))  # of a product, after which there is a report
     columns = np.atleast_2d(load.T)
     values = np.zeros_like(columns) if start is None else np.atleast_2d(start.T).copy()
     scaling, products = 1.0 / matrix.diagonal(), _STEPS if len(load) < _FEW else _PLAIN

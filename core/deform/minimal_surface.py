@@ -313,7 +313,7 @@ class _Film:
                 for axis in range(3):
                     step[free, axis] = _solve(stiffness, pulled[:, axis], inverse).values
         # Where it meets fixed parts of another slope an edge is sharp, however many points there are.
-        held = laplacian.stiffness @ np.isin(np.arange(len(points)), self.free, invert=True) != 0.0
+        held = laplacian.stiffness @ ~as_mask(self.free, len(points)) != 0.0
         bent = np.append(np.zeros(_FEW), (curvature * laplacian.smoothing_lengths[free])[~held[free]])
         return _State(
             points=points,
