@@ -2,9 +2,9 @@
 
 As many suites run side by side as there are cores, of the machine, a container or by MESHFREE_CORES, while this
 program makes the environments of the next ones; each but the window's in four parts, of every fourth file, so that no
-core waits long for the last. The wheel's mostly wait, and run beside. With --all each part of core's computes by other
-kernels of OpenBLAS, on one core and thread or two, for no result may hang on how these round. What pytest prints goes
-to a file per suite in build/tests/, and from there to the screen where a test fails.
+core waits long for the last. With --all each part of core's computes by other kernels of OpenBLAS, on one core and
+thread or two, for no result may hang on how these round. What pytest prints goes to a file per suite in build/tests/,
+and from there to the screen where a test fails.
 """
 
 import argparse
@@ -38,7 +38,7 @@ class Suites:
     """Runs of pytest side by side."""
 
     def __init__(self):
-        self._pool, self._beside = ThreadPoolExecutor(cores()), ThreadPoolExecutor(1)
+        self._pool = ThreadPoolExecutor(cores())
         self._runs = []
         self._processes = set()
 
@@ -47,21 +47,15 @@ class Suites:
 
     def __exit__(self, kind, *_):
         """Wait for all; after an error or Ctrl-C end those that run, and start no other."""
-        for pool in (self._pool, self._beside):
-            pool.shutdown(wait=False, cancel_futures=True)
+        self._pool.shutdown(wait=False, cancel_futures=True)
         if kind is not None:
             for process in list(self._processes):
                 _end(process)
-        for pool in (self._pool, self._beside):
-            pool.shutdown()
+        self._pool.shutdown()
 
     def start(self, name, python, *tests, **variables):
         """Run some tests in an environment as soon as a processor is free; see `isolated`."""
         self._runs.append(self._pool.submit(self._run, name, python, tests, variables))
-
-    def start_beside(self, name, python, *tests):
-        """Run some tests that mostly wait, and need no processor of their own, one suite after the other."""
-        self._runs.append(self._beside.submit(self._run, name, python, tests, {}))
 
     def start_folder(self, name, python, folder, *options, variables=({},)):
         """Run the tests of a folder in parts, by their files, with these options of pytest; variables take turns.
@@ -210,7 +204,7 @@ def main():
             turns = take_turns(kernels(python), number * _PARTS) if options.all else ({},)
             suites.start_folder(name, python, "tests/core", variables=turns)
         for version, python in found:
-            suites.start_beside(f"wheel-{version}", ensure(f"wheel-{version}", "wheel", python), "tests/wheel")
+            suites.start(f"wheel-{version}", ensure(f"wheel-{version}", "wheel", python), "tests/wheel")
         package.build([package.this_platform()])
         if options.gui or options.all:  # the longest: not the last
             start_gui(suites, required=options.gui)
