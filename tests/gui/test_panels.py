@@ -196,7 +196,7 @@ class TestSidebar:
     """The tab and its buttons."""
 
     def test_hide_and_show_while_it_works(self, gui):
-        add_sphere(gui, 15000, 0.005)
+        add_sphere(gui, 60_000, 0.005)  # work for longer than the keys take
         gui.open_tab()
         gui.press("meshfree.analyze")
         gui.wait_until(WORKING)

@@ -123,7 +123,7 @@ class TestJobs:
 
     @pytest.fixture
     def job(self, gui, request):
-        add_sphere(gui, 20000, 0.005)
+        add_sphere(gui, 40_000, 0.005)
         gui.python("bpy.ops.wm.save_as_mainfile(filepath=bpy.app.tempdir + 'job.blend')")
         start(gui, getattr(request, "param", "Analyze Points"))
         return gui
