@@ -40,9 +40,7 @@ class Level:
     mass: sparse.csr_array | None  # (n, n), inner product of its functions; none stands for the identity
     top: float  # largest eigenvalue, about
     steps: list[Array]  # (n, 1) float32 each, step lengths of the Chebyshev smoother, divided by the diagonal
-    # (n, m), (n, m) and (m, n), interpolation from the next level to this one, in double and single precision, and its
-    # transpose
-    prolongation: Rows
+    # (n, m) and (m, n), interpolation from the next level to this one, in single precision, and its transpose
     extension: Rows
     restriction: Rows
     known: Known | None = None
@@ -100,7 +98,7 @@ def build_levels(
             break
         top = rough_largest_eigenvalue(rows, diagonal)
         smooth *= np.maximum(_locally_largest(rows, smooth) / top, 1.0)
-        plain = sparse.csr_array((slowest / norm[part], part, np.arange(n + 1)), shape=(n, len(norm)))
+        plain = sparse.csr_array((slowest / norm[part], part, np.arange(n + 1, dtype=np.int32)), shape=(n, len(norm)))
         prolongation = (plain - sparse.diags_array(4.0 / 3.0 / top / diagonal) @ (rows @ plain)).tocsr()
         restriction = prolongation.T.tocsr()
         back = Rows(restriction, pool, report)
@@ -111,7 +109,6 @@ def build_levels(
                 mass=mass,
                 top=top * highest,
                 steps=[step[:, None].astype(np.float32) for step in smoothing_steps(top, smooth)],
-                prolongation=Rows(prolongation, pool, report),
                 extension=Rows(_single(prolongation), pool, report),
                 restriction=Rows(_single(restriction), pool, report),
             )
@@ -169,7 +166,7 @@ def aggregates(matrix: Rows, diagonal: Floats, share: float, report: Report) -> 
     best = np.flatnonzero(weight == np.maximum.reduceat(weight, first)[row])
     chosen = np.empty(n, dtype=np.int32)
     chosen[row[best]] = column[best]
-    return (np.cumsum(root) - 1)[chosen], np.flatnonzero(root)
+    return (np.cumsum(root, dtype=np.int32) - 1)[chosen], np.flatnonzero(root)
 
 
 def smoothing_steps(top: float, diagonal: Floats) -> list[Floats]:
