@@ -26,6 +26,7 @@ _CYCLES = 4  # V-cycles in a Davidson step, at most
 _FALL = 3.0  # factor by which a V-cycle reduces the residual, about
 _STEPS, _COARSE_STEPS = 24, 8  # at most; two to six are usual on the points, two on coarse levels
 _BLOCK = 1 << 11  # rows of vectors worked on at one time
+_TURNED = 1 << 14  # and multiplied with a dense matrix
 _PATIENCE = 12  # steps after which the block of vectors is widened
 
 
@@ -70,16 +71,16 @@ def coarse_to_fine(
         size = min(max(min(max(beyond, count), 2 * count + _WIDE), flat) + _GUARDS, len(values))
         for number in reversed(range(len(levels))):
             level, finest = levels[number], number == 0
-            start = level.extension @ vectors[:, : size if finest else 2 * size].astype(np.float32)
-            start = smoothed(level, np.zeros_like(start), start, level.steps)
-            guards = _random(len(start), max(_RANDOM, count + _RANDOM - start.shape[1])).astype(np.float32)
+            vectors = level.extension @ vectors[:, : size if finest else 2 * size].astype(np.float32)
+            vectors = smoothed(level, np.zeros_like(vectors), vectors, level.steps)
+            guards = _random(len(vectors), max(_RANDOM, count + _RANDOM - vectors.shape[1])).astype(np.float32)
             for _ in range(_FILTERED):
                 guards = solve_roughly(levels[number:], coarsest, guards, np.zeros(guards.shape[1], np.float32), size)
                 guards /= _lengths(guards)
-            start = np.column_stack([start, guards]).astype(np.float64)
+            vectors = np.column_stack([vectors, guards]).astype(np.float64)
             wanted, goal, limit = (count, tolerance, _STEPS) if finest else (size, _COARSE, _COARSE_STEPS)
             values, vectors, right = refine(
-                levels[number:], coarsest, start, size, wanted, goal, scale, limit, report, finest
+                levels[number:], coarsest, vectors, size, wanted, goal, scale, limit, report, finest
             )
             if not finest:
                 level.known = _known(values, vectors, level.mass)
@@ -111,7 +112,7 @@ def refine(
     coarsest : Known
         All eigenpairs of the version after the last level.
     vectors : ndarray, (n, m)
-        Approximate ones, and random ones, which converge to those that are missing.
+        Approximate ones, and random ones, which converge to those that are missing; overwritten.
     size : int
         How many the coarse versions gave.
     wanted : int
@@ -142,7 +143,8 @@ def refine(
         if drift > 0.1 * tolerance:
             drift, image = 0.0, level.matrix @ vectors
             values, basis = eigh(product(vectors.T, image), product(vectors.T, _weighed(level.mass, vectors)))
-            vectors, image = product(vectors, basis), product(image, basis)
+            _turn(vectors, basis)
+            _turn(image, basis)
         report()
         dual = _weighed(level.mass, vectors)
         residual, norms = _residual(image, dual, values)
@@ -188,12 +190,18 @@ def refine(
         values, parts = values[:count], parts[:, :count]
         share = (basis @ parts[count:]).astype(np.float32)
         report()
-        vectors, image = product(vectors, parts[:count]), product(image, parts[:count])
-        vectors += product(change, share)
-        image += product(changed, share)
+        _turn(vectors, parts[:count], (change, share))
+        _turn(image, parts[:count], (changed, share))
         lost = np.linalg.norm(share[:, :wanted], axis=0).max()
         drift += np.finfo(np.float32).eps * level.top * lost / measure
     return values, vectors, bool(excess <= 1.0)
+
+
+def _turn(vectors: Floats, basis: Floats, added: tuple[Array, Array] | None = None) -> None:
+    """Compute ``vectors @ basis`` in place, and add the product of two other matrices."""
+    for rows in blocks(len(vectors), _TURNED):
+        turned = product(vectors[rows], basis)
+        vectors[rows] = turned if added is None else turned + product(added[0][rows], added[1])
 
 
 def _residual(image: Floats, dual: Floats, values: Floats) -> tuple[Array, Floats]:

@@ -206,8 +206,8 @@ def solve_roughly(levels: list[Level], last: Known, load: Array, shifts: Array, 
             return solved
         load = load - product(known.duals, share)
     level = levels[0]
-    result: Array = level.extension @ solve_roughly(levels[1:], last, level.restriction @ load, shifts, wanted)
-    result = smoothed(level, load, result, level.steps)
+    coarse = solve_roughly(levels[1:], last, level.restriction @ load, shifts, wanted)
+    result = smoothed(level, load, level.extension @ coarse, level.steps)  # where no name keeps the first of the steps
     if solved is not None:
         result += solved
     return result

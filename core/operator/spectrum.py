@@ -104,7 +104,7 @@ def solve_spectrum(
             f"The eigenvalue solver found {np.sum(residuals <= tolerance)} of {count} modes on {n} points to a residual"
             f" of {tolerance:g}. Ask for fewer modes, or raise the tolerance."
         )
-    vectors = root[:, None] * vectors
+    vectors *= root[:, None]
     # Signs by the first of the largest entries: among equals, on a symmetric shape, rounding must not choose.
     sizes = np.abs(vectors)
     first = np.argmax(sizes >= (1.0 - _ALIKE) * sizes.max(axis=0), axis=0)
