@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 import core
 from benchmarks.samplings import random_sphere
-from core.algebra import coarse_to_fine, hierarchy, solvers
+from core.algebra import coarse_to_fine, davidson, hierarchy, solvers
 from core.algebra.hierarchy import approximate_inverse
 from core.algebra.rows import Rows
 from core.algebra.solvers import conjugate_gradients, solve_symmetric
@@ -153,6 +153,21 @@ def test_parts_that_become_one_unknown_each(thread):
         found = conjugate_gradients(matrix, load, scaling=approximate_inverse(matrix, pool, silent))
     assert found.converged
     assert found.products < 20
+
+
+def test_eigenvectors_some_at_a_time_are_those_of_all_at_once(monkeypatch):
+    """In V-cycles of few columns, and turned by few rows, in no more steps."""
+    matrix = kernel_matrix(random_sphere(6000), 0.12)
+    matrix /= matrix.diagonal().mean()
+    monkeypatch.setattr(davidson, "_STEPS", 10)  # nine are enough
+    found = []
+    for columns, rows in ((40, 1 << 14), (5, 700)):
+        monkeypatch.setattr(davidson, "_COLUMNS", columns)
+        monkeypatch.setattr(davidson, "_TURNED", rows)
+        found.append(coarse_to_fine(matrix, np.ones(6000), 16, 1e-7, 0.0, lambda *_: None))
+    (values, vectors), (others, parts) = found
+    np.testing.assert_allclose(others, values, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(parts @ (parts.T @ vectors), vectors, rtol=0.0, atol=1e-5)
 
 
 def test_the_result_does_not_depend_on_cores(operators, coarse, monkeypatch):
