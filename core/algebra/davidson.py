@@ -149,6 +149,7 @@ def refine(
         report()
         dual = _weighed(level.mass, vectors)
         residual, norms = _residual(image, dual, values)
+        del image  # large, and restored from the residual
         measure = max(values[wanted - 1], scale)
         residuals = norms / measure
         # Vectors just beyond the wanted ones must converge, too, or these stall, or a lower eigenvalue is missed.
@@ -175,6 +176,9 @@ def refine(
         kept = lengths > 1e-5 * lengths[-1]  # the others are rounding error
         basis = basis[:, kept] / np.sqrt(lengths[kept])
         coupling = product(residual.T, change) @ basis
+        image = dual * values
+        image += residual
+        del dual, residual
         report()
         changed = level.rough @ change
         own = basis.T @ product(change.T, changed) @ basis
@@ -184,6 +188,7 @@ def refine(
         report()
         _turn(vectors, parts[:count], (change, share))
         _turn(image, parts[:count], (changed, share))
+        del change, changed
         lost = np.linalg.norm(share[:, :wanted], axis=0).max()
         drift += np.finfo(np.float32).eps * level.top * lost / measure
     return values, vectors, bool(excess <= 1.0)
