@@ -11,19 +11,19 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
 
-from ..algebra import blocks, on_all_cores
+from ..algebra import blocks, eliminate, on_all_cores
 from ..kernel import SUPPORT
-from ..types import Array, Bools, Floats, Ints
+from ..types import Bools, Floats, Ints
 from .components import label_connected, number_by_size
 from .distances import heights_of_ends, pair_heights
 from .nearest import COUNT, FEW, NEXT, ON, SMOOTH, Nearest
 from .pairs import Pairs
 from .patches import Patch
-from .quadrics import Quadrics, chords, eighths, fit_quadrics, in_plane
+from .quadrics import Quadrics, along, chords, eighths, fit_quadrics, in_plane
 
 _LEANING = 0.1  # error of the normals: heights may be off by this share of the distance
 _SEEDS = 9  # nearest neighbors, every two of which span a candidate plane with the point
-_BLOCK = 1 << 11
+_BLOCK = 1 << 10
 _AROUND = 1.6  # path along a sheet over the chord, at most: 1.41 across a right angle, in steps that zigzag by an
 # eighth; points that many spacings apart touch
 _NEARBY, _SOURCES = 1 << 9, 1 << 6  # points that share a neighborhood; of them, from which paths are followed at once
@@ -100,8 +100,8 @@ def fit_sheets(nearest: Nearest, before: Sheets | None = None, changed: Bools | 
 
     def find(part: slice) -> None:
         block = looked[part]
-        offset = points[index[block]] - points[block, None]
-        planes[block] = _own_plane(offset, whole[block], spacing[block])
+        chord = chords(points, block, index[block]) / (ON * spacing[block, None])
+        planes[block] = _own_plane(chord, whole[block], planes[block])
 
     on_all_cores(find, blocks(len(looked), _BLOCK))
     changed = changed | changed[index].any(axis=1)
@@ -126,22 +126,33 @@ def fit_sheets(nearest: Nearest, before: Sheets | None = None, changed: Bools | 
     return Sheets(quadrics, nearest, mixed, planes)
 
 
-def _own_plane(offset: Floats, weight: Floats, spacing: Floats) -> Array:
-    first, second = np.triu_indices(min(_SEEDS, offset.shape[1] - 1), 1)
-    nearby = offset[:, 1 : COUNT // 2 + 1]
-    a, b = offset[:, 1 + first], offset[:, 1 + second]
-    normal = np.cross(a, b)
-    length = np.linalg.norm(normal, axis=2)
-    narrow = length < 0.25 * np.linalg.norm(a, axis=2) * np.linalg.norm(b, axis=2)
-    normal /= np.where(length > 0.0, length, 1.0)[:, :, None]
-    height = (normal @ np.swapaxes(nearby, 1, 2)) / (ON * spacing)[:, None, None]
-    cost = np.minimum(height**2, 1.0).sum(axis=2) + np.where(narrow, offset.shape[1], 0.0)
-    normal = normal[np.arange(len(normal)), cost.argmin(axis=1)]
+def _own_plane(chord: Floats, weight: Floats, planes: Floats) -> Floats:
+    """Return unit normals of the planes that have most neighbors near them, (k, 3).
+
+    Chords to the neighbors, (3, k, views), are in units of what a point on a surface may be off. Where the nearest ones
+    span no plane, as in a row, that of some normals, (k, 3), is where the search starts.
+    """
+    nearby = chord[:, :, 1 : COUNT // 2 + 1]
+    first, second = np.triu_indices(min(_SEEDS, nearby.shape[2]), 1)
+    normal = np.cross(nearby[:, :, first], nearby[:, :, second], axis=0)
+    length, side = np.linalg.norm(normal, axis=0), np.linalg.norm(nearby[:, :, :_SEEDS], axis=0)
+    narrow = length < 0.25 * side[:, first] * side[:, second]
+    normal /= np.where(length > 0.0, length, 1.0)
+    height = normal.transpose(1, 2, 0) @ nearby.transpose(1, 0, 2)
+    height *= height
+    cost = np.minimum(height, 1.0, out=height).sum(axis=2) + np.where(narrow, chord.shape[2], 0.0)
+    rows, best = np.arange(len(weight)), cost.argmin(axis=1)
+    axis = np.where(narrow[rows, best], planes.T, normal[:, rows, best])
+    equations = np.empty((3, 4, len(weight)))
     for _ in range(4):
-        height = np.einsum("ikc,ic->ik", offset, normal) / (ON * spacing)[:, None]
-        near = weight / (1.0 + height**2) ** 2
-        normal = np.linalg.eigh(np.swapaxes(near[:, :, None] * offset, 1, 2) @ offset)[1][:, :, 0]
-    return normal
+        near = weight / (1.0 + along(chord, axis) ** 2) ** 2
+        equations[:, :3] = np.einsum("aik,bik->abi", near * chord, chord)
+        equations[:, 3] = axis
+        # A step of inverse iteration towards the direction of the least variance, which the next one goes on from.
+        equations[range(3), range(3)] += 1e-6 * equations[range(3), range(3)].sum(axis=0)
+        axis = eliminate(equations)[:, 3]
+        axis /= np.linalg.norm(axis, axis=0)
+    return axis.T
 
 
 def label_sheets(nearest: Nearest, normals: Floats, component: Ints) -> Ints:
