@@ -11,11 +11,10 @@ from .agreed import Decisions
 from .boundary import Boundary
 from .cells import Cells
 from .moments import MET, least_error
-from .nearest import ENOUGH, GAP, POWER, ROUNDS, Nearest
+from .nearest import ENOUGH, GAP, POWER, ROUNDS, WIDER, Nearest
 from .quadrics import Quadrics
 
 _NARROWEST = 1.08  # h over the radius of the cells
-_WIDER = 1.3  # factor from each width that is tried to the next
 _BENT = 0.02  # relative error from the surface's curvature within the kernel, over squared curvatures times h^2
 _STEPS = 4  # from neighbors to their neighbors, in search of the place deepest inside the boundary
 
@@ -95,8 +94,8 @@ def _widening(
     least = error(rows, factor)
     while len(rows):
         # Stop once the moment error is negligible, or the total error is below the curvature error of the next width.
-        open_ = least > np.maximum((_WIDER * factor) ** 2 * bend[rows], factor**2 * bend[rows] + MET)
-        rows, least, factor = rows[open_], least[open_], _WIDER * factor
+        open_ = least > np.maximum((WIDER * factor) ** 2 * bend[rows], factor**2 * bend[rows] + MET)
+        rows, least, factor = rows[open_], least[open_], WIDER * factor
         found = error(rows, factor)
         better = found < least
         rows, least = rows[better], found[better]

@@ -25,6 +25,7 @@ ON = 0.3  # spacings from a surface within which a point lies on it
 SMOOTH = 0.7  # cosine between normals of one smooth sheet, or between directions across one boundary, at least
 GAP = 2.5  # times the usual that a gap may be wide, as in rows 25 times denser along than across: else it is a hole
 ROW = 0.2  # roundness of the nearest points of a row: ten times denser along than across, and of the nearest eight
+WIDER = 1.3  # factor from each width of a kernel that is tried to the next
 _MEASURED = 100_000  # points whose neighbors are searched for in a tenth of a second
 
 

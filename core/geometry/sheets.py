@@ -16,7 +16,7 @@ from ..kernel import SUPPORT
 from ..types import Bools, Floats, Ints
 from .components import label_connected, number_by_size
 from .distances import heights_of_ends, pair_heights
-from .nearest import COUNT, FEW, NEXT, ON, SMOOTH, Nearest
+from .nearest import COUNT, ENOUGH, FEW, NEXT, ON, SMOOTH, WIDER, Nearest
 from .pairs import Pairs
 from .patches import Patch
 from .quadrics import Quadrics, along, chords, eighths, fit_quadrics, in_plane
@@ -230,8 +230,10 @@ def separate_sheets(
 
     Normals decide it for most pairs. Where they leave a doubt, two points lie on one sheet if a path of short steps
     joins them along it that is not much longer than their distance, nor, where it leads around an edge, than the kernel
-    reaches. A point that would keep fewer than a dozen pairs,
-    such as one that lies off all sheets, keeps all of them, as in `Nearest.keep`: so few would hardly couple it.
+    reaches. At the rim of the support, beyond the next narrower kernel, a pair weighs next to nothing: next to points
+    that pairs nearer by are left out of, it is left out, too, unless fewer than two dozen others are left. A point that
+    would keep fewer than a dozen, such as one that lies off all sheets, keeps all of them, as in `Nearest.keep`: so few
+    would hardly couple it.
 
     Parameters
     ----------
@@ -253,22 +255,34 @@ def separate_sheets(
     Pairs
         The same ones where all lie on one sheet.
     """
-    doubtful = np.flatnonzero(~_plainly_on_one_sheet(pairs, oriented, nearest.spacing))
-    if not len(doubtful):
+    doubtful = ~_plainly_on_one_sheet(pairs, oriented, nearest.spacing)
+    if not doubtful.any():
         return pairs
-    first, second = pairs.first[doubtful], pairs.second[doubtful]
-    # Between points that face away from each other an arc would span more than a right angle. What joins them is a path
-    # around an edge: longer than the kernel reaches, but for its zigzag, it joins nothing.
-    away = np.einsum("pc,pc->p", oriented[first], oriented[second]) < 0.0
-    reach = np.where(away, SUPPORT * pairs.mean(pairs.lengths)[doubtful], np.inf)
-    longest = _AROUND * np.minimum(pairs.distance[doubtful], np.sqrt(0.5) * reach)
-    apart = ways_along(step_lengths(nearest, sides, settle), nearest.tree, first, second, longest) > longest
-    kept = np.ones(len(pairs.first), dtype=bool)
-    kept[doubtful[apart]] = False
-    left = np.bincount(np.append(pairs.first[kept], pairs.second[kept]), minlength=len(sides))
-    few = left < FEW
-    kept |= few[pairs.first] | few[pairs.second]
-    return pairs.keep(kept) if apart.any() else pairs
+    steps = step_lengths(nearest, sides, settle)
+    reach = SUPPORT * pairs.mean(pairs.lengths)
+
+    def apart(some: Ints) -> Bools:
+        first, second = pairs.first[some], pairs.second[some]
+        # Between points that face away from each other an arc would span more than a right angle. What joins them is a
+        # path around an edge: longer than the kernel reaches, but for its zigzag, it joins nothing.
+        away = np.einsum("pc,pc->p", oriented[first], oriented[second]) < 0.0
+        longest = _AROUND * np.minimum(pairs.distance[some], np.where(away, np.sqrt(0.5) * reach[some], np.inf))
+        return ways_along(steps, nearest.tree, first, second, longest) > longest
+
+    def count(some: Bools | Ints) -> Ints:
+        return np.bincount(np.append(pairs.first[some], pairs.second[some]), minlength=len(sides))
+
+    def at_either(points: Bools) -> Bools:
+        return points[pairs.first] | points[pairs.second]
+
+    kept, rim = ~doubtful, WIDER * pairs.distance > reach
+    inside = np.flatnonzero(doubtful & ~rim)
+    kept[inside] = ~apart(inside)
+    parted = count(inside[~kept[inside]]) > 0
+    needed = np.flatnonzero(doubtful & rim & (at_either(count(kept) < ENOUGH) | ~at_either(parted)))
+    kept[needed] = ~apart(needed)
+    kept |= at_either(count(kept) < FEW)
+    return pairs if kept.all() else pairs.keep(kept)
 
 
 def _plainly_on_one_sheet(pairs: Pairs, oriented: Floats, spacing: Floats) -> Bools:

@@ -178,6 +178,20 @@ class TestPairs:
         apart = read_cloud(points, LaplacianOptions())
         assert len(apart.pairs.first) == len(read_cloud(points, LaplacianOptions(sheets=False)).pairs.first)
 
+    def test_at_the_rim_those_in_doubt_are_left_out_where_nearer_ones_are(self, monkeypatch):
+        points = np.random.default_rng(0).uniform(size=(1500, 3))  # which lie on no surface
+
+        def found():
+            pairs = read_cloud(points, LaplacianOptions()).pairs
+            inside = 1.3 * pairs.distance < SUPPORT * pairs.mean(pairs.lengths)
+            return set(zip(pairs.first.tolist(), pairs.second.tolist(), inside.tolist(), strict=True))
+
+        some = found()
+        monkeypatch.setattr(sheets, "WIDER", 1.0)  # no pair is at the rim
+        more = found() - some
+        assert len(more) > 0.1 * len(some)
+        assert not any(inside for _, _, inside in more)
+
 
 class TestOrientation:
     def test_outward_on_a_closed_plate(self):
