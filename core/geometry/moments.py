@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from itertools import pairwise
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from ..algebra import blocks, eliminate, on_all_cores
 from ..kernel import SUPPORT, pair_kernel
 from ..types import Floats, Ints
 from .boundary import Boundary
-from .nearest import COUNT, Nearest
+from .nearest import Nearest
 from .quadrics import along, chords, frames, gathered
 from .sheets import on_sheet
 
@@ -76,20 +77,18 @@ def least_error(
 
     def measure(part: slice) -> None:
         block, found = rows[part], result[part]
-        open_ = np.arange(len(block))
-        for most in (COUNT, *_MORE):
-            asked = block[open_]
-            if most == COUNT:
-                distance, index = nearest.distance[asked], nearest.index[asked]
-            else:
-                distance, index = nearest.tree.query(nearest.points[asked], k=min(most, len(normals)))
-            found[open_] = solve(asked, distance[:, 1:], index[:, 1:])
-            # More neighbors can only meet the moments better.
-            more = (distance[:, -1] <= SUPPORT * lengths[asked]) & (len(normals) > most) & (found[open_] > MET)
-            open_ = open_[more]
-            if not len(open_):
-                return
-        found[open_] = 0.0
+        found[:] = solve(block, nearest.distance[block, 1:], nearest.index[block, 1:])
+        # More neighbors can only meet the moments better.
+        open_ = np.flatnonzero((nearest.distance[block, -1] <= SUPPORT * lengths[block]) & (found > MET))
+        places, reach = nearest.points[block[open_]], SUPPORT * lengths[block[open_]]
+        count = nearest.tree.query_ball_point(places, reach, return_length=True)
+        found[open_[count > _MORE[-1]]] = 0.0
+        for fewer, most in pairwise((0, *_MORE)):
+            asked = open_[(fewer < count) & (count <= most)]
+            if len(asked):
+                here = block[asked]
+                distance, index = nearest.tree.query(nearest.points[here], k=range(2, min(most, len(normals)) + 1))
+                found[asked] = solve(here, distance, index)
 
     def solve(rows: Ints, distance: Floats, index: Ints) -> Floats:
         """Return the least error of some points with these neighbors."""
