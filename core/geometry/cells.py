@@ -13,7 +13,7 @@ from .boundary import Boundary
 from .distances import arc_ahead, arc_squared, bent_ways, heights_of_ends
 from .edges import Sides
 from .nearest import COUNT, Nearest
-from .quadrics import CURVED, along, chords, frames, gathered
+from .quadrics import CURVED, along, chords, components, frames
 from .sheets import on_sheet
 
 _BLOCK = 1 << 12
@@ -132,7 +132,11 @@ def _cuts(
     around = normals if sides is None else sides.around
     chord, frame = chords(nearest.points, rows, index), frames(normals[rows])[:, :, 1:]
     cosine, left, right = heights_of_ends(chord, normals, rows, index)
-    turned = cosine if around is normals else sum(part[rows, None] * gathered(part, index) for part in around.T)
+    turned = (
+        cosine
+        if around is normals
+        else sum(own[:, None] * part for own, part in zip(around[rows].T, components(around, index), strict=True))
+    )
     side = np.where(turned < 0.0, -1.0, 1.0)
     cosine, right = side * cosine, side * right
     squared, ahead = arc_squared(distance**2, left, right, cosine), arc_ahead(left, right)
@@ -142,8 +146,8 @@ def _cuts(
         turn = sides.turn(rows[edged[0]], index[edged], chord[:, edged[0], edged[1]].T, side[edged])
         heights = left[edged], right[edged], cosine[edged]
         squared[edged], ahead[edged] = bent_ways(distance[edged] ** 2, *heights, turn, sure[edged])
-    for step, normal in zip(chord, normals.T, strict=True):
-        step += side * ahead * gathered(normal, index)
+    for step, normal in zip(chord, components(normals, index), strict=True):
+        step += side * ahead * normal
     step = np.stack([along(chord, axis) for axis in frame.transpose(2, 1, 0)])
     length = 0.5 * np.sqrt(squared) * (1.0 + np.clip(gaussian_curvature[rows, None] * squared / 12.0, -CURVED, CURVED))
     length = np.maximum(length, _CLOSEST * nearest.spacing[rows, None])

@@ -7,7 +7,7 @@ import numpy as np
 from ..algebra import by_blocks
 from ..types import Floats, Ints
 from .nearest import AGREEING, NEXT, SMOOTH, Nearest
-from .quadrics import chords, gathered
+from .quadrics import chords, components
 
 
 def arc_squared(squared: Floats, left: Floats, right: Floats, cosine: Floats | float = 1.0) -> Floats:
@@ -105,8 +105,8 @@ def heights_of_ends(chord: Floats, normals: Floats, rows: Ints, other: Ints) -> 
     and along the second, (k, views) each.
     """
     cosine, left, right = np.zeros((3, *other.shape))
-    for step, normal in zip(chord, normals.T, strict=True):
-        here, there = normal[rows, None], gathered(normal, other)
+    for step, own, there in zip(chord, normals[rows].T, components(normals, other), strict=True):
+        here = own[:, None]
         cosine += there * here
         left += step * here
         right += step * there

@@ -1,5 +1,6 @@
 """Local quadrics around each point: normal and curvature of the surface."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -191,15 +192,24 @@ def chords(points: Floats, rows: Ints, index: Ints) -> Floats:
 
     One coordinate after the other, as arrays whose last axis is three long take several times as long.
     """
-    result, index = np.empty((3, *index.shape)), index.astype(np.intp, copy=False)
-    for place, chord in zip(points.T, result, strict=True):
-        np.subtract(gathered(place, index), place[rows, None], out=chord)
+    result = np.empty((3, *index.shape))
+    for place, own, chord in zip(components(points, index), points[rows].T, result, strict=True):
+        np.subtract(place, own[:, None], out=chord)
     return result
 
 
 def gathered(values: Array, index: Ints) -> Array:
     """Return the values, (m,), of points, all in range: to check that takes longer than to take them."""
     return np.take(values, index, mode="clip")
+
+
+def components(vectors: Floats, index: Ints) -> Iterator[Floats]:
+    """Yield the components of vectors, (m, 3), of points, one after the other, (k, views) each.
+
+    They are taken from one line of numbers: of a column, numpy would make a copy first, whole, for the few of a block.
+    """
+    line, start = vectors.reshape(-1), 3 * index.astype(np.intp)
+    return (gathered(line[axis:], start) for axis in range(3))
 
 
 def in_plane(chord: Floats, normals: Floats) -> Floats:
