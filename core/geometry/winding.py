@@ -1,5 +1,6 @@
 """Which side of a surface is outside, by winding numbers: signs of patches within which all normals agree."""
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ _PATCHES = 200  # that a surface is divided into at most
 _CLUMPS = 1500  # of points, each a dipole; pairs of them are summed in blocks
 _FINE = 32_000  # clumps that stand for the points where they are near, so that close sheets are separated
 _NEAR = 3.0  # sizes of a clump
-_BLOCK = 250
+_BLOCK = 1 << 15  # pairs of dipoles taken at one time: of more, and memory is asked of the system again and again
 _COUPLED = 0.1  # common energy over the size of the smaller of two groups of patches that have one outside
 _SAMPLE = 2000  # points whose spacing gives the median one
 
@@ -111,8 +112,7 @@ def _patch_energies(points: Floats, normals: Floats, weight: Floats, patch: Ints
     count = patch.max() + 1
     fine, _ = _clumps(points, weight[:, None] * normals, weight, patch, _FINE)
     coarse, clump = _clumps(*fine[:4], _CLUMPS)
-    energy = _energies(*coarse, count)
-    return energy if len(coarse[0]) == len(fine[0]) else energy + _corrections(fine, coarse, clump, count)
+    return _energies(*coarse, count, _near_energies(fine, coarse, clump) if len(coarse[0]) < len(fine[0]) else ())
 
 
 def _clumps(
@@ -123,15 +123,15 @@ def _clumps(
     Return place, moment, weight and patch of each clump, and the size of a place; and the clump of each dipole, (m,)
     int.
     """
-    size = 0.0 if len(points) <= most else np.sqrt(len(points) / most) * _median_spacing(points)
+    size, count = _median_spacing(points), len(points)
+    if count <= most:
+        return (points, moments, weight, patch, size), np.arange(count)
+    size *= np.sqrt(count / most)
     while True:
-        if not size:
-            clump, count = np.arange(len(points)), len(points)
-        else:
-            cell = np.floor((points - points.min(axis=0)) / size).astype(np.int64)
-            _, clump = np.unique(np.column_stack([patch, cell]), axis=0, return_inverse=True)
-            clump = clump.reshape(-1)
-            count = clump.max() + 1
+        clump = patch
+        for column in np.floor((points - points.min(axis=0)) / size).astype(np.int64).T:
+            clump = np.unique(clump * (column.max() + 1) + column, return_inverse=True)[1]
+        count = clump.max() + 1
         if count <= most:
             break
         size *= 1.2
@@ -142,7 +142,7 @@ def _clumps(
     moment = np.column_stack([np.bincount(clump, moments[:, axis], count) for axis in range(3)])
     owner = np.empty(count, dtype=int)
     owner[clump] = patch
-    return (place, moment, total, owner, max(size, _median_spacing(points))), clump
+    return (place, moment, total, owner, size), clump
 
 
 def _median_spacing(points: Floats) -> float:
@@ -151,63 +151,65 @@ def _median_spacing(points: Floats) -> float:
     return float(np.median(spacing_of(cKDTree(points).query(some, k=min(NEIGHBORS + 1, len(points)))[0])))
 
 
-def _energies(place: Floats, moment: Floats, _: Floats, owner: Ints, width: float, count: int) -> Floats:
-    """Return the mutual energy of each two patches, (count, count), by dipoles smoothed over a width."""
-    result = np.zeros((count, count))
-    patches = sparse.csr_array((np.ones(len(owner)), (np.arange(len(owner)), owner)), shape=(len(owner), count))
-    dipoles = place - place.mean(axis=0), moment
-    parts = blocks(len(place), _BLOCK)
+def _energies(
+    place: Floats, moment: Floats, _: Floats, owner: Ints, width: float, count: int, near: tuple[Array, ...] = ()
+) -> Floats:
+    """Return the mutual energy of each two patches, (count, count), by dipoles smoothed over a width.
 
-    def sums(part: slice) -> Any:
-        return _between(dipoles[0][part], moment[part], *dipoles, width) @ patches
-
-    for part, energy in zip(parts, on_all_cores(sums, parts), strict=True):
-        result += patches[part].T @ energy
-    return result
-
-
-def _corrections(fine: Any, coarse: Any, clump: Any, count: Any) -> Any:
-    """Return by how much the energy of each two patches is more, (count, count), where near clumps are taken finely.
-
-    Within a clump there is one patch, whose energy with itself does not matter.
+    `near` are the first and the second ones of some pairs, the first ones less, and energies to take for them, (p,).
     """
+    energy, place = np.zeros((len(place),) * 2), place - place.mean(axis=0)
+
+    def measure(part: slice) -> None:
+        on = slice(part.start, None)  # each pair once
+        energy[part, on] = _between(place[part], moment[part], place[on], moment[on], width)
+        energy[part, part] *= 0.5
+
+    on_all_cores(measure, blocks(len(place), max(1, _BLOCK // len(place))))
+    if near:
+        first, second, exact = near
+        energy[first, second], energy[second, first] = exact, 0.0
+    patches = sparse.csr_array((np.ones(len(owner)), (np.arange(len(owner)), owner)), shape=(len(owner), count))
+    half: Floats = patches.T @ energy @ patches
+    return half + half.T
+
+
+def _near_energies(fine: Any, coarse: Any, clump: Any) -> tuple[Array, ...]:
+    """Return the pairs of near clumps of different patches, (p,) each, and their energies by what they consist of."""
     first, second = cKDTree(coarse[0]).query_pairs(_NEAR * coarse[4], output_type="ndarray").T
     apart = coarse[3][first] != coarse[3][second]
     order = np.argsort(first[apart], kind="stable")
     first, second = first[apart][order], second[apart][order]
     member, size = np.argsort(clump, kind="stable"), np.bincount(clump)
-    members = np.split(member, np.cumsum(size)[:-1])
-    ones, starts = np.unique(first, return_index=True)
-    others = np.split(second, starts[1:])
+    place, moment, start = fine[0][member], fine[1][member], np.cumsum(size) - size
+    turn = np.cumsum(size[first] * size[second]) // _BLOCK
+    cuts = np.flatnonzero(np.diff(first, prepend=-1, append=-1) | np.diff(turn, prepend=-1, append=-1))
+    result = np.empty(len(first))
 
-    def rows(part: slice) -> Floats:
-        result = np.zeros((count, count))
-        for one, near in zip(ones[part], others[part], strict=True):
-            exact = np.concatenate([members[other] for other in near])
-            energy = np.bincount(fine[3][exact], _between_some(fine, members[one], exact).sum(axis=0), count)
-            rough = _between_some(coarse, np.array([one]), near)[0]
-            result[coarse[3][one]] += energy - np.bincount(coarse[3][near], rough, count)
-        return result
+    def measure(part: slice) -> None:
+        for low, high in pairwise(cuts[part.start : part.stop + 1]):
+            one, near = first[low], second[low:high]
+            own, ends = slice(start[one], start[one] + size[one]), np.cumsum(size[near])
+            other = np.arange(ends[-1]) + np.repeat(start[near] + size[near] - ends, size[near])
+            middle = coarse[0][one]
+            energy = _between(place[own] - middle, moment[own], place[other] - middle, moment[other], fine[4])
+            result[low:high] = np.add.reduceat(energy.sum(axis=0), ends - size[near])
 
-    result = sum(on_all_cores(rows, blocks(len(ones), _BLOCK)), np.zeros((count, count)))
-    return result + result.T
-
-
-def _between_some(dipoles: Any, first: Ints, second: Ints) -> Floats:
-    """Return the energy of each two of some dipoles and some others, (k, l)."""
-    place, moment, _, _, width = dipoles
-    middle = place[first[0]]
-    return _between(place[first] - middle, moment[first], place[second] - middle, moment[second], width)
+    on_all_cores(measure, blocks(len(cuts) - 1, _CLUMPS))
+    return first, second, result
 
 
 def _between(place: Floats, moment: Floats, others: Floats, moments: Floats, width: float) -> Floats:
     """Return the energy of each two of k dipoles and l others, (k, l), smoothed over a width."""
-    here = moment @ others.T - np.einsum("ij,ij->i", moment, place)[:, None]
-    there = np.einsum("ij,ij->i", moments, others) - place @ moments.T
-    square = -2.0 * place @ others.T
+    along = moment @ others.T
+    along -= np.einsum("ij,ij->i", moment, place)[:, None]
+    there = place @ -moments.T
+    there += np.einsum("ij,ij->i", moments, others)
+    along *= there
+    square = np.matmul(-2.0 * place, others.T, out=there)
     square += np.einsum("ij,ij->i", place, place)[:, None]
     square += np.einsum("ij,ij->i", others, others) + width**2
-    return coupling(moment @ moments.T, here * there, np.maximum(square, width**2), width**2)
+    return coupling(moment @ moments.T, along, np.maximum(square, width**2, out=square), width**2)
 
 
 def coupling(alike: Floats, along: Floats, square: Floats, smoothed: float = 0.0) -> Floats:
@@ -217,8 +219,8 @@ def coupling(alike: Floats, along: Floats, square: Floats, smoothed: float = 0.0
     thick. What they do to each other within that thickness is left out: two parallel layers have no energy in common,
     however close, as those that are thin.
     """
-    share = 3.0 / square
-    return (alike * (1.0 - smoothed * share) - along * share) / (4.0 * np.pi * square * np.sqrt(square))
+    near = 1.0 / square
+    return (alike - 3.0 * near * (along + smoothed * alike)) * (0.25 / np.pi * near * np.sqrt(near))
 
 
 def _least(energy: Floats) -> Floats:
