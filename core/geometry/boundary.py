@@ -184,39 +184,42 @@ def measure_boundary(nearest: Nearest, normals: Floats, at_boundary: Bools) -> B
         return boundary
     course = _fit_course(nearest, normals, rows)
     tree = cKDTree(nearest.points[rows])
-    span, view = tree.query(nearest.points, k=min(COUNT, len(rows)), workers=cores())
-    close = np.flatnonzero(span[:, 0] < reach)
+    close = np.flatnonzero(tree.query(nearest.points, workers=cores())[0] < reach)
+    span, view = tree.query(nearest.points[close], k=min(COUNT, len(rows)), workers=cores())
 
     def measure(part: slice) -> None:
         block = close[part]
-        seen, near = view[block], span[block]
-        spacing = nearest.spacing[block, None]
+        seen, near = view[part], span[part]
+        spacing, within = nearest.spacing[block], near < reach[block, None]
         # Near candidates are best, and those away from corners of the boundary.
-        doubt = (near + GAP * spacing) * course.scatter[seen]
-        distance, curvature = course.measure(nearest.points, normals, block, seen)
-        every = np.arange(len(block))
-        eligible = _on_sheet(nearest, normals, block, rows[seen], near) & (near < reach[block, None])
+        doubt = (near + GAP * spacing[:, None]) * course.scatter[seen]
+        same, cosine = on_sheet(nearest, normals, block, rows[seen], near)
+        eligible = within & same & (cosine > 0.0)
         for side in (0, 1):
             best = np.argmin(np.where(eligible, doubt, np.inf), axis=1)
-            ahead = course.outward[seen[every, best]]
-            same = eligible & (np.einsum("ikc,ic->ik", course.outward[seen], ahead) > SMOOTH)
-            trust = np.where(same, (doubt / doubt.min(axis=1, keepdims=True)) ** -POWER, 0.0)
+            chosen = seen[np.arange(len(block)), best]
+            ahead, some = course.outward[chosen], np.nonzero(eligible)
+            eligible[some] = np.einsum("pc,pc->p", course.outward[seen[some]], ahead[some[0]]) > SMOOTH
+            some = np.nonzero(eligible)
+            trust, distance, curvature = np.zeros((3, *seen.shape))
+            trust[some] = (doubt[some] / doubt.min(axis=1)[some[0]]) ** -POWER
+            distance[some], curvature[some] = course.measure(nearest.points, normals, block[some[0]], seen[some])
             total = trust.sum(axis=1)
-            known = same.any(axis=1)
+            known = eligible.any(axis=1)
             total[~known] = 1.0
             measured = np.maximum((trust * distance).sum(axis=1) / total, 0.0)
             # Far from the boundary's points its course is a guess, which may lead past a point that it is nowhere near.
-            known &= np.where(same, near, np.inf).min(axis=1) <= measured + GAP * spacing[:, 0]
+            known &= np.where(eligible, near, np.inf).min(axis=1) <= measured + GAP * spacing
             boundary.distance[block, side] = np.where(known, measured, np.inf)
             boundary.curvature[block, side] = (trust * curvature).sum(axis=1) / total
             boundary.outward[block, side] = np.where(known[:, None], ahead, 0.0)
             if side == 0:
                 # Around a corner that the surface fills, the second boundary lies inside the first, across it.
-                chosen = seen[every, best][:, None]
-                apart, expected = course.ahead(nearest.points, chosen, seen)
-                other = np.einsum("ikc,ikc->ik", course.outward[seen], expected) < SMOOTH
-                eligible = other & (apart < ON * spacing) & (near < reach[block, None])
-                eligible &= np.einsum("ikc,ic->ik", normals[rows[seen]], normals[block]) > SMOOTH
+                eligible = within & (cosine > SMOOTH)
+                some = np.nonzero(eligible)
+                apart, expected = course.ahead(nearest.points, chosen[some[0]], seen[some])
+                other = np.einsum("pc,pc->p", course.outward[seen[some]], expected) < SMOOTH
+                eligible[some] = other & (apart < ON * spacing[some[0]])
 
     on_all_cores(measure, blocks(len(close), _BLOCK))
     nearer = np.argsort(boundary.distance, axis=1, kind="stable")
@@ -245,29 +248,27 @@ class _Course:
     def ahead(self, points: Floats, chosen: Ints, seen: Ints) -> tuple[Floats, Floats]:
         """Return how far other boundary points lie outside a parabola's tangent, and its direction across there."""
         chord = points[self.rows[seen]] - points[self.rows[chosen]]
-        t = np.einsum("ikc,ikc->ik", chord, self.along[chosen])
-        _, b, c = np.moveaxis(self.coefficients[chosen], 2, 0)
-        expected = self.across[chosen] - (b + 2.0 * c * t)[:, :, None] * self.along[chosen]
-        expected /= np.linalg.norm(expected, axis=2)[:, :, None]
-        return np.einsum("ikc,ikc->ik", chord, self.outward[chosen]), expected
+        t = np.einsum("pc,pc->p", chord, self.along[chosen])
+        _, b, c = self.coefficients[chosen].T
+        expected = self.across[chosen] - (b + 2.0 * c * t)[:, None] * self.along[chosen]
+        expected /= np.linalg.norm(expected, axis=1)[:, None]
+        return np.einsum("pc,pc->p", chord, self.outward[chosen]), expected
 
-    def measure(self, points: Floats, normals: Floats, block: Ints, seen: Ints) -> tuple[Floats, Floats]:
-        """Return the distance of points from the parabolas that they see, and the curvature of these, (k, views)."""
-        chord = points[block, None] - points[self.rows[seen]]
-        other = normals[self.rows[seen]]
-        side = np.sign(np.einsum("ic,ikc->ik", normals[block], other))[:, :, None]
-        left, height = (
-            np.einsum("ikc,ikc->ik", chord, side * normals[block, None]),
-            np.einsum("ikc,ikc->ik", chord, other),
-        )
-        squared = np.maximum(np.einsum("ikc,ikc->ik", chord, chord), 1e-300)
+    def measure(self, points: Floats, normals: Floats, first: Ints, seen: Ints) -> tuple[Floats, Floats]:
+        """Return the distance of points from the parabolas that they see, and the curvature of these, (p,) each."""
+        chord = points[first] - points[self.rows[seen]]
+        own, other = normals[first], normals[self.rows[seen]]
+        left, height = np.einsum("pc,pc->p", chord, own), np.einsum("pc,pc->p", chord, other)
+        left *= np.sign(np.einsum("pc,pc->p", own, other))
+        squared = np.maximum(np.einsum("pc,pc->p", chord, chord), 1e-300)
         stretch = np.sqrt(arc_squared(squared, left, height) / squared)
-        t = np.einsum("ikc,ikc->ik", chord, self.along[seen])
-        e = np.einsum("ikc,ikc->ik", chord, self.across[seen])
+        t = np.einsum("pc,pc->p", chord, self.along[seen])
+        e = np.einsum("pc,pc->p", chord, self.across[seen])
         e = np.where(e < 0.0, -1.0, 1.0) * np.hypot(e, height) * stretch
-        a, b, c = np.moveaxis(self.coefficients[seen], 2, 0)
-        slope = 1.0 + (b + 2.0 * c * t) ** 2
-        return (a + b * t + c * t * t - e) / np.sqrt(slope), -2.0 * c / (1.0 + b**2) ** 1.5
+        a, b, c = self.coefficients.T
+        curvature = -2.0 * c / (1.0 + b**2) ** 1.5
+        a, b, c, curvature = (values[seen] for values in (a, b, c, curvature))
+        return (a + b * t + c * t * t - e) / np.sqrt(1.0 + (b + 2.0 * c * t) ** 2), curvature
 
 
 def _fit_course(nearest: Nearest, normals: Floats, rows: Ints) -> _Course:
