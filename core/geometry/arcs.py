@@ -32,7 +32,7 @@ def arc_length(cloud: Cloud) -> Floats:
         edged = np.flatnonzero(sure)
         if len(edged):
             first, second = (ends[patch.pairs][edged] for ends in (pairs.first, pairs.second))
-            turn = cloud.sides.turn(first, second, chord[:, edged].T, side[edged])
+            turn = cloud.sides.turn(first, second, chord[:, edged], side[edged])
             arc[edged] = bent_ways(squared[edged], left[edged], right[edged], cosine[edged], turn, sure[edged])[0]
         if steep:
             arc += patch.mean(cloud.squared_slope) * np.maximum(squared - patch.mean(cloud.spacing) ** 2, 0.0)

@@ -143,7 +143,7 @@ def _cuts(
     if sides is not None:
         sure = np.maximum(sides.sharp[rows, None], sides.sharp[index])
         edged = np.nonzero(sure)
-        turn = sides.turn(rows[edged[0]], index[edged], chord[:, edged[0], edged[1]].T, side[edged])
+        turn = sides.turn(rows[edged[0]], index[edged], chord[:, edged[0], edged[1]], side[edged])
         heights = left[edged], right[edged], cosine[edged]
         squared[edged], ahead[edged] = bent_ways(distance[edged] ** 2, *heights, turn, sure[edged])
     for step, normal in zip(chord, components(normals, index), strict=True):

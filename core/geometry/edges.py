@@ -12,7 +12,7 @@ from ..types import Bools, Floats, Ints
 from .moments import MET
 from .nearest import POWER, SMOOTH, Nearest
 from .noise import LEFT
-from .quadrics import Quadrics, fit_quadrics, heights_over
+from .quadrics import Quadrics, entries, fit_quadrics, heights_over, rises
 
 _ROUNDS = 8  # of fits, each by the normals of the last; nearly all points need fewer
 _COEFFICIENTS = 6  # of a quadric
@@ -32,13 +32,12 @@ class Sides:
     around: Floats
 
     def turn(self, first: Ints, second: Ints, chord: Floats, side: Floats) -> Floats:
-        """Return by how much normals differ along chords, (k, 3), by the bends at both ends: what is no edge.
+        """Return by how much normals differ along chords, (3, k), by the bends at both ends: what is no edge.
 
         `side` is -1 where the normals of both ends point to different sides of the surface, else 1.
         """
-        form = self.shape_operator[first] + side[:, None, None] * self.shape_operator[second]
-        result: Floats = 0.5 * np.einsum("pa,pab,pb->p", chord, form, chord)
-        return result
+        own, other = entries(self.shape_operator, first), entries(self.shape_operator, second)
+        return rises([one + side * two for one, two in zip(own, other, strict=True)], *chord)
 
     def toward(self, normals: Floats) -> Sides:
         """Return the same, seen from where normals of the surface, (m, 3), point."""

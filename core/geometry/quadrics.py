@@ -176,15 +176,22 @@ def heights_over(quadrics: Quadrics, points: Floats, rows: Ints, other: Ints) ->
     Rows and others, the points with the quadrics and those above them, have shapes that broadcast to that.
     """
     x, y, z = (
-        points[other, axis] - (points[rows, axis] + quadrics.height[rows, axis])  # not of all points, for some rows
-        for axis in range(3)
+        place[other] - (place[rows] + height[rows])  # not of all points, for some rows
+        for place, height in zip(points.T, quadrics.height.T, strict=True)
     )
-    (xx, xy, xz), (_, yy, yz), (_, _, zz) = (
-        [quadrics.shape_operator[:, row, column][rows] for column in range(3)] for row in range(3)
-    )
-    square = 0.5 * (xx * x**2 + yy * y**2 + zz * z**2) + xy * x * y + xz * x * z + yz * y * z
-    a, b, c = (quadrics.normals[:, axis][rows] for axis in range(3))
-    return a * x + b * y + c * z + square
+    a, b, c = (normal[rows] for normal in quadrics.normals.T)
+    return a * x + b * y + c * z + rises(entries(quadrics.shape_operator, rows), x, y, z)
+
+
+def entries(form: Floats, rows: Ints) -> list[Floats]:
+    """Return the entries on and above the diagonal of the symmetric forms, (m, 3, 3), of some rows: arrays of these."""
+    return [form[:, row, column][rows] for row in range(3) for column in range(row, 3)]
+
+
+def rises(form: list[Floats], x: Floats, y: Floats, z: Floats) -> Floats:
+    """Return by how much surfaces rise over their tangent planes along steps, by the `entries` of their forms."""
+    xx, xy, xz, yy, yz, zz = form
+    return x * (0.5 * xx * x + xy * y + xz * z) + y * (0.5 * yy * y + yz * z) + 0.5 * zz * z**2
 
 
 def chords(points: Floats, rows: Ints, index: Ints) -> Floats:
