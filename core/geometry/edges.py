@@ -12,7 +12,7 @@ from ..types import Bools, Floats, Ints
 from .moments import MET
 from .nearest import POWER, SMOOTH, Nearest
 from .noise import LEFT
-from .quadrics import Quadrics, entries, fit_quadrics, heights_over, rises
+from .quadrics import Quadrics, components, entries, fit_quadrics, heights_over, rises
 
 _ROUNDS = 8  # of fits, each by the normals of the last; nearly all points need fewer
 _COEFFICIENTS = 6  # of a quadric
@@ -88,7 +88,9 @@ def _refit(
     """
     index = nearest.index[rows]
     toward = found.normals[_closest(nearest, found, rows) if beside else rows]
-    cosine = np.abs(np.einsum("ikc,ic->ik", found.normals[index], toward))
+    cosine = np.abs(
+        sum(own[:, None] * other for own, other in zip(toward.T, components(found.normals, index), strict=True))
+    )
     weight = nearest.weight[rows] * np.maximum((cosine - SMOOTH) / (1.0 - SMOOTH), 0.0) ** POWER
     count = weight.sum(axis=1) ** 2 / np.maximum((weight**2).sum(axis=1), 1e-300)
     enough = count > _COEFFICIENTS
@@ -106,6 +108,6 @@ def _closest(nearest: Nearest, quadrics: Quadrics, rows: Ints) -> Ints:
     What it misses are the neighbors that it was fitted to, and the point.
     """
     index = nearest.index[rows]
-    missed = np.hypot(heights_over(quadrics, nearest.points, index, rows[:, None]), quadrics.misfit[index])
+    missed = heights_over(quadrics, nearest.points, index, rows[:, None]) ** 2 + quadrics.misfit[index] ** 2
     missed[nearest.weight[rows] == 0.0] = np.inf
     return index[np.arange(len(rows)), missed.argmin(axis=1)]
