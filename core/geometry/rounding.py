@@ -33,7 +33,7 @@ _ROUNDS = 4  # of fits without those
 _STEEP = 1.7  # slope of the surface over the plane across the direction: where it is steeper, steps are along it
 _RIDGE = 1e-10  # keeps the equations solvable where the neighbors lie on a conic
 _PAIRS = np.triu_indices(7)  # of the coefficients and the height, whose products the equations sum up
-_BLOCK = 1 << 10  # points fitted at one time
+_BLOCK = 1 << 9  # points fitted at one time
 
 
 class Smoothed(NamedTuple):
@@ -137,15 +137,15 @@ def smooth_along(nearest: Nearest, rounding: Floats) -> Smoothed:
         height, u, v = np.moveaxis((points[index] - points[part, None]) @ turn, 2, 0) / distance[:, -1:]
         weight = fading = fading_weights(distance)
         cut = _CUT * 0.5 * step[part] / distance[:, -1]
-        basis = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v, height], axis=2)
-        products = basis[:, :, _PAIRS[0]] * basis[:, :, _PAIRS[1]]
+        basis = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v, height])
+        products = basis[_PAIRS[0]] * basis[_PAIRS[1]]
         equations = np.empty((len(u), 7, 7))
         for _ in range(_ROUNDS):
-            sums = (weight[:, None] @ products)[:, 0]
+            sums = np.einsum("ik,nik->in", weight, products)
             equations[:, _PAIRS[0], _PAIRS[1]] = equations[:, _PAIRS[1], _PAIRS[0]] = sums
             equations[:, range(6), range(6)] += _RIDGE
             fit = np.linalg.solve(equations[:, :6, :6], equations[:, :6, 6:])
-            off = height - (basis[:, :, :6] @ fit)[:, :, 0]
+            off = height - np.einsum("nik,in->ik", basis[:6], fit[:, :, 0])
             wide = np.hypot(cut, _CUT * np.median(np.abs(off), axis=1))
             weight = fading * np.maximum(1.0 - (off / wide[:, None]) ** 2, 1e-6) ** 2
         kept = (np.abs(off[:, 0]) < wide) & (np.hypot(fit[:, 1, 0], fit[:, 2, 0]) < _STEEP)
