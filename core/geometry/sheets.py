@@ -26,7 +26,7 @@ _SEEDS = 9  # nearest neighbors, every two of which span a candidate plane with 
 _BLOCK = 1 << 10
 _AROUND = 1.6  # path along a sheet over the chord, at most: 1.41 across a right angle, in steps that zigzag by an
 # eighth; points that many spacings apart touch
-_NEARBY, _SOURCES = 1 << 9, 1 << 6  # points that share a neighborhood; of them, from which paths are followed at once
+_NEARBY, _SOURCES = 1 << 8, 1 << 5  # points that share a neighborhood; of them, from which paths are followed at once
 
 
 def same_sheet(
