@@ -25,7 +25,8 @@ _COARSE = 1e-2  # residual on coarse levels: a smaller one would not improve the
 _CYCLES = 4  # V-cycles in a Davidson step, at most
 _FALL = 3.0  # factor by which a V-cycle reduces the residual, about
 _STEPS, _COARSE_STEPS = 24, 8  # at most; two to six are usual on the points, two on coarse levels
-_COLUMNS = 40  # in a V-cycle at one time: with 20, products take a quarter more time; with 72, an eighth less
+_COLUMNS = 40  # in a V-cycle at one time, at least: with 20, products take a quarter more time; with 72, an eighth less
+_ENTRIES = 1 << 24  # of these columns, up to which there may be more: of 200,000 points all of 50 modes
 _BLOCK = 1 << 11  # rows of vectors worked on at one time
 _TURNED = 1 << 14  # and multiplied with a dense matrix
 _PATIENCE = 12  # steps after which the block of vectors is widened
@@ -213,7 +214,7 @@ def _corrections(
     level, found = levels[0], _single(vectors)
     weighed = found if level.mass is None else _single(dual)
     result = np.zeros((len(found), len(active)), dtype=np.float32)
-    for part in blocks(len(active), _COLUMNS):
+    for part in blocks(len(active), max(_COLUMNS, _ENTRIES // len(found))):
         load, shifts = np.take(residual, active[part], axis=1), values[active[part]].astype(np.float32)
         load /= _lengths(load)
         for left in reversed(range(cycles)):
