@@ -447,7 +447,7 @@ def _notices(
     noisy, filling = np.mean(noise > 0.0), np.mean(noise > FILLING)
     level, rounded = noise.mean() / max(noisy, 1e-300), step > 0.0
     texts = {
-        f"Points that lie on another one: {duplicates}. They share one area.": duplicates,
+        f"Points that lie on another one: {duplicates:,}. They share one area.": duplicates,
         f"Depth is rounded in steps of {step:.2g} of the spacing. Results are of a surface that is smoothed by"
         f" {level:.2f} of the spacing at {noisy:.0%} of the points, and lacks details of a few spacings.": rounded,
         f"Noise of {level:.2f} of the spacing, at {noisy:.0%} of the points. Results are of a smoothed surface.": noisy
@@ -456,8 +456,8 @@ def _notices(
         f"Noise of more than half the spacing, at {filling:.0%} of the points. Results are of a smoothed surface"
         " without their details: areas may be off by 10 % and more. Use more exact points.": filling > MANY
         and not rounded,
-        f"Outliers and small components left out: {left_out} ({100.0 * share:.2g} %).": left_out,
-        f"Points in components of no more than {neighbors} points: {short}. How far off the neighbor of that number"
+        f"Outliers and small components left out: {left_out:,} ({100.0 * share:.2g} %).": left_out,
+        f"Points in components of no more than {neighbors} points: {short:,}. How far off the neighbor of that number"
         " would be was extrapolated there.": short,
         "Part of the surface is too narrow for its points: areas there may be off by 10 % or more. Add points.": narrow,
     }

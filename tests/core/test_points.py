@@ -147,7 +147,7 @@ class TestDuplicates:
         rng = np.random.default_rng(1)
         near = [sphere + apart * rng.standard_normal(sphere.shape) for _ in range(copies)]
         laplacian = core.build_laplacian(np.concatenate([sphere, *near]))
-        assert laplacian.notices == [f"Points that lie on another one: {copies * len(sphere)}. They share one area."]
+        assert laplacian.notices == [f"Points that lie on another one: {copies * len(sphere):,}. They share one area."]
         np.testing.assert_allclose(laplacian.areas[: len(sphere)] * (copies + 1), both[0].areas, rtol=1e-6)
 
     def test_a_heap_is_one_point(self, sphere):
