@@ -114,6 +114,7 @@ def build_levels(
             )
         )
         matrix = back @ (rows @ prolongation)
+        matrix.setdiag(matrix.diagonal())  # stored also where a component cancels: products leave out what is zero
         mass = back @ (prolongation if mass is None else mass @ prolongation)
         slowest = norm
     return levels, matrix, mass

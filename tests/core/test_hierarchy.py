@@ -155,6 +155,24 @@ def test_parts_that_become_one_unknown_each(thread):
     assert found.products < 20
 
 
+def test_components_that_cancel_exactly():
+    """They become one unknown each whose row is zero: it has an entry all the same."""
+    big = kernel_matrix(random_sphere(12_000), 10.0 / np.sqrt(12_000))  # a thousand on the second level
+    pair = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    matrix = sparse.block_diag([pair, big, pair], format="csr")
+    values, vectors = coarse_to_fine(matrix, np.ones(12_004), 6, 1e-6, 1e-3, lambda *_: None)
+    assert np.abs(values[:3]).max() < 1e-9 * values[-1] < values[3]
+    missed = np.linalg.norm(matrix @ vectors - vectors * values, axis=0)
+    assert missed.max() < 1e-6 * values[-1]
+    load = np.concatenate([pair[0], random_sphere(12_000)[:, 2], pair[0]])
+    load[2:-2] -= load[2:-2].mean()
+    with ThreadPoolExecutor() as pool:
+        found = conjugate_gradients(matrix, load, scaling=approximate_inverse(matrix, pool, silent))
+    assert found.converged
+    assert found.products < 20
+    np.testing.assert_allclose(found.values[[0, 1, -2, -1]], [0.5, -0.5] * 2, rtol=0.0, atol=1e-6)
+
+
 def test_eigenvectors_some_at_a_time_are_those_of_all_at_once(monkeypatch):
     """In V-cycles of few columns, and turned by few rows, in no more steps."""
     matrix = kernel_matrix(random_sphere(6000), 0.12)
