@@ -158,7 +158,7 @@ def measure_surface(
         cells = cells_within(edge, cells)
     report("Neighbors", 0.48)
     lengths = smoothing_lengths(nearest, oriented, quadrics, cells, edge, options, sample.component, decisions)
-    first_and_second = find_pairs(nearest.tree, lengths, lambda: report("Neighbors", 0.6), nearest)
+    first_and_second = find_pairs(nearest.tree, lengths, lambda: report("Neighbors", 0.6))
     pairs = Pairs(nearest.points, lengths, *first_and_second)
     parted = edge.parting(nearest.tree, sides.normals, pairs.first, pairs.second, gaps)
     if len(parted):

@@ -9,18 +9,16 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from ..algebra import blocks, on_all_cores
-from ..cores import cores
+from ..algebra import on_all_cores
 from ..kernel import SUPPORT
 from ..types import Array, Bools, Floats, Ints, Report
-from .nearest import Nearest
 from .patches import Patch, divide_pairs
 
 Ends: TypeAlias = Sequence[Sequence[Floats]] | Floats  # quantities of pairs at their first and second points
 
-_BLOCK = 1 << 19  # neighbor candidates that a core looks at at one time while the pairs are collected
-_NEAR = 1 << 13  # points whose known neighbors are looked at at one time
-_GROUPS = 4  # groups of points by their number of candidates, for each doubling of it
+_ROWS = 1 << 12  # points whose pairs are searched for at one time, at most
+_CANDIDATES = 1 << 20  # neighbors that a core looks at at one time meanwhile, about
+_GROUPS = 4  # groups of points by their radii, for each doubling of it
 
 
 @dataclass(frozen=True)
@@ -77,48 +75,38 @@ class Pairs:
         return start
 
 
-def find_pairs(
-    tree: cKDTree, lengths: Floats, report: Report = lambda: None, nearest: Nearest | None = None
-) -> list[Array]:
+def find_pairs(tree: cKDTree, lengths: Floats, report: Report = lambda: None) -> list[Array]:
     """Find all pairs nearer than 3 h_ij, with h_ij = (h_i + h_j) / 2, for smoothing lengths h, (n,).
 
     Return their first and second points, (pairs,) int32, each pair once and ordered by the first, and their distances.
-    Points are distinct. Where their nearest ones reach further than the kernel, no others are searched for. `report` is
-    called before each block of points; it may raise `Cancelled`.
+    Points are distinct. `report` is called before each block of points; it may raise `Cancelled`.
     """
     radii = SUPPORT * lengths
     many, found = np.zeros(tree.n, dtype=np.int64), []
 
-    def keep(rows: Ints, distance: Floats, column: Ints) -> None:
-        reach, other = radii[rows, None], radii[column]
+    def search(rows: Ints) -> None:
+        here, some = radii[rows], cKDTree(tree.data[rows], balanced_tree=False, compact_nodes=False)
+        if len(rows) > 1 and some.count_neighbors(tree, here.max()) > _CANDIDATES:
+            for half in np.array_split(rows, 2):
+                search(half)
+            return
+        near = some.sparse_distance_matrix(tree, here.max(), output_type="ndarray")
+        first, second, distance = near["i"], near["j"], near["v"]
+        own, other = here[first], radii[second]
         # Each pair is stored at the end with the larger radius, whose search always finds it.
-        kept = (reach > other) | ((reach == other) & (rows[:, None] < column))
-        kept &= distance <= 0.5 * (reach + other)
-        many[rows] = np.count_nonzero(kept, axis=1)
-        found.append((rows, column[kept].astype(np.int32), distance[kept]))
+        kept = (own > other) | ((own == other) & (rows[first] < second))
+        kept &= distance <= 0.5 * (own + other)
+        first = first[kept].astype(np.uint16)  # which is sorted by counting
+        order = np.argsort(first, kind="stable")
+        many[rows] = np.bincount(first, minlength=len(rows))
+        found.append((rows, second[kept][order].astype(np.int32), distance[kept][order]))
 
-    open_ = np.arange(tree.n)
-    if nearest is not None:
-        known = (radii < nearest.distance[:, -1]) & ~nearest.in_row
-        open_ = np.flatnonzero(~known)
-        rows = np.flatnonzero(known)
-        near = [rows[part] for part in blocks(len(rows), _NEAR)]
-        on_all_cores(lambda rows: keep(rows, nearest.distance[rows], nearest.index[rows]), near, report)
-    # Counting is cheap. Points with about as many candidates are then queried together, for hardly more than they have.
-    count = tree.query_ball_point(tree.data[open_], radii[open_], workers=cores(), return_length=True)
-    group = np.ceil(np.log2(count) * _GROUPS).astype(np.int16)
-    order = np.argsort(group, kind="stable")
-    groups = np.split(order, np.flatnonzero(np.diff(group[order])) + 1) if len(order) else []
-
-    def search(part: tuple[Ints, int]) -> None:
-        rows, most = part
-        keep(rows, *tree.query(tree.data[rows], k=np.arange(1, most + 1)))
-
-    parts = []
-    for members in groups:
-        most = int(count[members].max())
-        parts += [(rows, most) for rows in np.array_split(open_[members], len(members) * most // _BLOCK + 1)]
-    on_all_cores(search, parts, report)
+    # Points that lie near each other and have about one radius are searched around together: the trees are compared by
+    # whole branches, in half the time of a search around each point.
+    size = np.floor(np.log2(radii[tree.indices]) * _GROUPS).astype(np.int16)
+    order = np.argsort(size, kind="stable")
+    groups = np.split(tree.indices[order], np.flatnonzero(np.diff(size[order])) + 1)
+    on_all_cores(search, [part for group in groups for part in np.array_split(group, len(group) // _ROWS + 1)], report)
     start = np.cumsum(many) - many
     first = np.repeat(np.arange(tree.n, dtype=np.int32), many)
     second, distance = np.empty(len(first), dtype=np.int32), np.empty(len(first))

@@ -4,9 +4,10 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from benchmarks.samplings import random_sphere, uneven_sphere
+from core.geometry import pairs as neighbor_pairs
 from core.geometry import patches
 from core.geometry.cloud import read_cloud
-from core.geometry.nearest import find_nearest, nearest_rows, typical_distance
+from core.geometry.nearest import nearest_rows, typical_distance
 from core.geometry.pairs import Pairs, find_pairs
 from core.options import LaplacianOptions
 
@@ -29,14 +30,18 @@ def test_pairs_are_all_within_three_mean_lengths_each_once(spread):
     np.testing.assert_allclose(distance, np.linalg.norm(points[first] - points[second], axis=1), atol=1e-14)
 
 
-@pytest.mark.parametrize("length", [0.03, 0.06, 0.12])  # all pairs known, some, none
-def test_pairs_known_from_the_nearest_neighbors_are_those_that_a_search_finds(length):
+@pytest.mark.parametrize("spread", [1.0, 8.0])
+def test_pairs_of_many_candidates_are_found_by_parts(monkeypatch, spread):
     points = random_sphere(2000)
-    nearest, lengths = find_nearest(points), length * 2.0 ** np.random.default_rng(1).random(2000)
-    searched, known = find_pairs(nearest.tree, lengths), find_pairs(nearest.tree, lengths, nearest=nearest)
-    in_reach = 3.0 * lengths < nearest.distance[:, -1]
-    assert (in_reach.all(), in_reach.any()) == (length < 0.05, length < 0.1)
-    assert all(map(np.array_equal, searched, known))
+    tree, lengths = cKDTree(points), 0.06 * spread ** np.random.default_rng(1).random(2000)
+    whole = find_pairs(tree, lengths)
+    monkeypatch.setattr(neighbor_pairs, "_ROWS", 300)
+    monkeypatch.setattr(neighbor_pairs, "_CANDIDATES", 900)
+    parts = find_pairs(tree, lengths)
+    for first, second, distance in (whole, parts):
+        order = np.lexsort((second, first))
+        first[:], second[:], distance[:] = first[order], second[order], distance[order]
+    assert all(map(np.array_equal, whole, parts))
 
 
 def test_patches_hold_each_pair_once_and_sum_at_both_ends(monkeypatch):
