@@ -11,6 +11,7 @@ from scipy.linalg import eigh
 from ..cores import cores
 from ..types import Array, Floats, Ints
 from .blocks import blocks, on_all_cores
+from .chebyshev import chebyshev_steps
 from .dense import product, subtract_product
 from .hierarchy import SMALL, Known, Level, build_levels, smoothed, solve_roughly
 
@@ -23,7 +24,8 @@ _FILTERED = 3  # V-cycles applied to these first, which damp their high-frequenc
 _GUARDED = 0.1  # residual to which the vectors beyond those wanted converge, so that none below is missed
 _COARSE = 1e-2  # residual on coarse levels: a smaller one would not improve the start on the next level
 _CYCLES = 4  # V-cycles in a Davidson step, at most
-_FALL = 3.0  # factor by which a V-cycle reduces the residual, about
+_FALL = 3.5  # factor by which a V-cycle reduces the residual, about
+_CYCLED = 0.5, 1.2  # eigenvalues of the matrix times a V-cycle, nearly all: the smoother overshoots by .17
 _STEPS, _COARSE_STEPS = 24, 8  # at most; two to six are usual on the points, two on coarse levels
 _COLUMNS = 40  # in a V-cycle at one time, at least: with 20, products take a quarter more time; with 72, an eighth less
 _ENTRIES = 1 << 24  # of these columns, up to which there may be more: of 200,000 points all of 50 modes
@@ -207,7 +209,7 @@ def _corrections(
     size: int,
     cycles: int,
 ) -> Array:
-    """Return corrections of the active vectors by some V-cycles, of length one and orthogonal to all vectors.
+    """Return corrections of the active vectors by V-cycles, accelerated, of length one and orthogonal to all vectors.
 
     They are computed for some of them at a time, as a V-cycle takes several times their memory.
     """
@@ -217,13 +219,18 @@ def _corrections(
     for part in blocks(len(active), max(_COLUMNS, _ENTRIES // len(found))):
         load, shifts = np.take(residual, active[part], axis=1), values[active[part]].astype(np.float32)
         load /= _lengths(load)
+        rates, change = chebyshev_steps(*_CYCLED), np.zeros_like(load)
         for left in reversed(range(cycles)):
-            change = solve_roughly(levels, coarsest, load, shifts / np.float32(values[size - 1]), size)
-            subtract_product(change, found, product(weighed.T, change))
+            cycle = solve_roughly(levels, coarsest, load, shifts / np.float32(values[size - 1]), size)
+            subtract_product(cycle, found, product(weighed.T, cycle))
+            kept, rate = next(rates)
+            change *= kept
+            cycle *= rate
+            change += cycle
+            del cycle
             result[:, part] += change
             if left:
                 load = _rest(level, mass, load, change, shifts)
-            del change
     result /= _lengths(result)
     return result
 
