@@ -25,7 +25,7 @@ _GUARDED = 0.1  # residual to which the vectors beyond those wanted converge, so
 _COARSE = 1e-2  # residual on coarse levels: a smaller one would not improve the start on the next level
 _CYCLES = 4  # V-cycles in a Davidson step, at most
 _FALL = 3.5  # factor by which a V-cycle reduces the residual, about
-_CYCLED = 0.5, 1.2  # eigenvalues of the matrix times a V-cycle, nearly all: the smoother overshoots by .17
+_CYCLED = 0.4, 1.2  # eigenvalues of the matrix times a V-cycle, nearly all: the smoother overshoots by .17
 _STEPS, _COARSE_STEPS = 24, 8  # at most; two to six are usual on the points, two on coarse levels
 _COLUMNS = 40  # in a V-cycle at one time, at least: with 20, products take a quarter more time; with 72, an eighth less
 _ENTRIES = 1 << 24  # of these columns, up to which there may be more: of 200,000 points all of 50 modes
@@ -64,17 +64,17 @@ def coarse_to_fine(
         Ascending, orthonormal.
     """
     with ThreadPoolExecutor(cores()) as pool:
-        least = max(SMALL, 5 * count)
+        least = max(SMALL, min(20 * count, 3 * SMALL), 5 * count)
         levels, last, mass = build_levels(matrix, slowest, least, 3 * count, pool, report, scale)
         if not levels or last.shape[0] > max(least, _DENSE):
             return None
         values, vectors = eigh(last.toarray(), mass.toarray())
         coarsest = _known(values, vectors, mass)
         flat = np.searchsorted(values, 1e-9 * values[-1])  # dimension of the null space: one for each component
-        beyond = np.searchsorted(values, (1.0 + _BEYOND) * values[min(count, len(values)) - 1])
-        size = min(max(min(max(beyond, count), 2 * count + _WIDE), flat) + _GUARDS, len(values))
         for number in reversed(range(len(levels))):
             level, finest = levels[number], number == 0
+            beyond = np.searchsorted(values, (1.0 + _BEYOND) * values[min(count, len(values)) - 1])
+            size = min(max(min(max(beyond, count), 2 * count + _WIDE), flat) + _GUARDS, len(values))
             vectors = level.extension @ vectors[:, : size if finest else 2 * size].astype(np.float32)
             vectors = smoothed(level, np.zeros_like(vectors), vectors, level.steps)
             guards = _random(len(vectors), max(_RANDOM, count + _RANDOM - vectors.shape[1])).astype(np.float32)
@@ -139,9 +139,11 @@ def refine(
     """
     level, count, worst = levels[0], vectors.shape[1], 0.0
     rough_mass = None if level.mass is None else level.mass.astype(np.float32)
+    before = excess = np.inf
     drift = np.inf  # bound on the rounding error of `image`, updated step by step; 0 for an exact product
     for step in range(limit + 1):
-        if final and step % _PATIENCE == _PATIENCE - 1:  # the block may cut an eigenspace in two: widen it
+        if final and step % _PATIENCE == _PATIENCE - 1 and excess > max(1.0, 0.5 * before):
+            # It stalls: the block may cut an eigenspace in two. Widen it.
             vectors = np.column_stack([vectors, _random(len(vectors), _RANDOM + count // 8, step)])
             drift, count = np.inf, vectors.shape[1]
         if drift > 0.1 * tolerance:
@@ -155,11 +157,13 @@ def refine(
         del image  # large, and restored from the residual
         measure = max(values[wanted - 1], scale)
         residuals = norms / measure
-        # Vectors just beyond the wanted ones must converge, too, or these stall, or a lower eigenvalue is missed.
-        beyond = np.clip((values - values[wanted - 1]) / (0.5 * _BEYOND * measure), 0.0, 1.0)
-        goals = tolerance * (max(_GUARDED, tolerance) / tolerance) ** beyond
+        # Vectors just beyond the wanted ones must converge, too, or these stall, or a lower eigenvalue is missed. There
+        # is one as near to each value as its residual: for those far beyond half the way to the wanted is enough.
+        ahead = (values - values[wanted - 1]) / measure
+        most = np.maximum(max(_GUARDED, tolerance), 0.5 * ahead)
+        goals = tolerance * (most / tolerance) ** np.clip(ahead / (0.5 * _BEYOND), 0.0, 1.0)
         goals[:wanted] = tolerance
-        excess = np.max(residuals / goals)
+        before, excess = excess, np.max(residuals / goals)
         if final:
             worst = worst or 10.0 * excess
             report(1.0 - max(np.log(10.0 * excess), 0.1) / np.log(10.0 * worst) if 1.0 < excess < worst else 0.0)
