@@ -10,6 +10,8 @@ from ..types import Array, Floats
 from .blocks import blocks, on_all_cores
 
 _WORK = 1 << 27  # multiplications in one call: it holds Python's lock for some hundredths of a second
+_ALONE = 1 << 18  # up to which OpenBLAS wakes no threads: these then keep a core for some hundredths of a second, awake
+_LEAST = 1 << 8  # rows, in calls of that many multiplications, that are worth a call
 _BLOCK = 1 << 13  # small matrices
 
 
@@ -20,10 +22,10 @@ def product(left: Array, right: Array) -> Array:
     """
     (m, k), n = left.shape, right.shape[1]
     gemm = get_blas_funcs("gemm", (left, right))
-    if 0 < m * k * n <= _WORK:
+    if 0 < m * k * n <= _ALONE:
         return _multiply(gemm, left, right)
     result, longest = np.zeros((m, n), dtype=gemm.dtype), max(m, k)
-    for part in blocks(longest if result.size else 0, max(1, _WORK * longest // max(1, m * k * n))):
+    for part in blocks(longest if result.size else 0, _rows(m * k * n // max(1, longest))):
         if m >= k:
             _multiply(gemm, left[part], right, c=result[part].T, overwrite_c=True)
         else:
@@ -34,8 +36,14 @@ def product(left: Array, right: Array) -> Array:
 def subtract_product(result: Array, left: Array, right: Array) -> None:
     """Compute ``result -= left @ right`` in place, for a contiguous result, (m, n), of the precision of both."""
     gemm, (m, n) = get_blas_funcs("gemm", (left, right)), result.shape
-    for part in blocks(m, max(1, _WORK // max(1, left.shape[1] * n))):
+    for part in blocks(m, _rows(left.shape[1] * n)):
         _multiply(gemm, left[part], right, -1.0, beta=1.0, c=result[part].T, overwrite_c=True)
+
+
+def _rows(width: int) -> int:
+    """Return how many rows are multiplied in one call, by the multiplications that each takes."""
+    alone = _ALONE // max(1, width)
+    return alone if alone >= _LEAST else max(1, _WORK // max(1, width))
 
 
 def _multiply(gemm: Callable[..., Array], left: Array, right: Array, factor: float = 1.0, **settings: Any) -> Array:

@@ -7,12 +7,15 @@ from core.algebra import dense
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("least", [1, 1 << 8])
 @pytest.mark.parametrize("work", [1, 1000, 1 << 27])
 @pytest.mark.parametrize(
     ("m", "k", "n"), [(500, 7, 5), (7, 500, 5), (6, 6, 6), (1, 1, 1), (3, 4, 90), (0, 3, 2), (3, 0, 2)]
 )
-def test_product_of_all_orders(monkeypatch, dtype, work, m, k, n):
+def test_product_of_all_orders(monkeypatch, dtype, work, least, m, k, n):
     monkeypatch.setattr(dense, "_WORK", work)
+    monkeypatch.setattr(dense, "_ALONE", min(work, 1 << 18))
+    monkeypatch.setattr(dense, "_LEAST", least)
     rng = np.random.default_rng(0)
     for flip_left in (False, True):
         for flip_right in (False, True):
@@ -32,9 +35,12 @@ def test_product_of_parts_of_matrices():
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("least", [1, 1 << 8])
 @pytest.mark.parametrize("work", [1, 1000, 1 << 27])
-def test_a_product_is_subtracted_in_place(monkeypatch, dtype, work):
+def test_a_product_is_subtracted_in_place(monkeypatch, dtype, work, least):
     monkeypatch.setattr(dense, "_WORK", work)
+    monkeypatch.setattr(dense, "_ALONE", min(work, 1 << 18))
+    monkeypatch.setattr(dense, "_LEAST", least)
     rng = np.random.default_rng(0)
     result, left, right = (rng.standard_normal(shape).astype(dtype) for shape in ((90, 4), (90, 7), (7, 4)))
     expected = result - left @ right
