@@ -189,6 +189,15 @@ def test_eigenvectors_some_at_a_time_are_those_of_all_at_once(monkeypatch):
     np.testing.assert_allclose(parts @ (parts.T @ vectors), vectors, rtol=0.0, atol=1e-5)
 
 
+def test_a_block_that_converges_is_not_widened(monkeypatch):
+    """Nor while what has converged is checked: new vectors would have to converge first."""
+    matrix = kernel_matrix(random_sphere(6000), 0.12)
+    monkeypatch.setattr(davidson, "_PATIENCE", 2)
+    monkeypatch.setattr(davidson, "_STEPS", 7)
+    values, vectors = coarse_to_fine(matrix, np.ones(6000), 16, 1e-7, 0.0, lambda *_: None)
+    assert np.linalg.norm(matrix @ vectors - vectors * values, axis=0).max() < 1e-7 * values[-1]
+
+
 def test_the_result_does_not_depend_on_cores(operators, coarse, monkeypatch):
     matrix, load = fixed_ends(operators("another random sphere"))
     found = []
