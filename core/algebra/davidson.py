@@ -163,6 +163,8 @@ def refine(
         most = np.maximum(max(_GUARDED, tolerance), 0.5 * ahead)
         goals = tolerance * (most / tolerance) ** np.clip(ahead / (0.5 * _BEYOND), 0.0, 1.0)
         goals[:wanted] = tolerance
+        if values[wanted - 1] <= tolerance * measure:  # none is lower than zero, as of many components
+            goals[wanted:] = np.inf
         before, excess = excess, np.max(residuals / goals)
         if final:
             worst = worst or 10.0 * excess
