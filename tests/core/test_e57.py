@@ -345,6 +345,8 @@ BROKEN = {
 def test_files_that_lie(tmp_path, what):
     """With checksums that are right."""
     data, text = BROKEN[what]
+    (tmp_path / "a.e57").write_bytes(seal(make_e57((points(PLACES), 40, ""))))
+    read_points(tmp_path / "a.e57")  # loads the modules of the reader, whose memory does not count
     (tmp_path / "a.e57").write_bytes(seal(data))
     tracemalloc.start()
     try:
