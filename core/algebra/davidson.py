@@ -13,7 +13,7 @@ from ..types import Array, Floats, Ints
 from .blocks import blocks, on_all_cores
 from .chebyshev import chebyshev_steps
 from .dense import product, subtract_product
-from .hierarchy import SMALL, Known, Level, build_levels, smoothed, solve_roughly
+from .hierarchy import LARGE, SMALL, Known, Level, build_levels, smoothed, solve_roughly
 
 _DENSE = 4000  # in ten seconds; where the coarsest version has more, another solver is faster
 _BEYOND = 0.1  # relative margin above the last eigenvalue wanted, up to which the block holds eigenvectors
@@ -31,7 +31,7 @@ _COLUMNS = 40  # in a V-cycle at one time, at least: with 20, products take a qu
 _ENTRIES = 1 << 24  # of these columns, up to which there may be more: of 200,000 points all of 50 modes
 _BLOCK = 1 << 11  # rows of vectors worked on at one time
 _TURNED = 1 << 14  # and multiplied with a dense matrix
-_PATIENCE = 12  # steps after which the block of vectors is widened
+_PATIENCE = 12  # steps after which the block of vectors is widened, where it stalls
 
 
 def coarse_to_fine(
@@ -64,7 +64,7 @@ def coarse_to_fine(
         Ascending, orthonormal.
     """
     with ThreadPoolExecutor(cores()) as pool:
-        least = max(SMALL, min(20 * count, 3 * SMALL), 5 * count)
+        least = max(SMALL, min(20 * count, LARGE), 5 * count)
         levels, last, mass = build_levels(matrix, slowest, least, 3 * count, pool, report, scale)
         if not levels or last.shape[0] > max(least, _DENSE):
             return None
@@ -225,9 +225,10 @@ def _corrections(
     for part in blocks(len(active), max(_COLUMNS, _ENTRIES // len(found))):
         load, shifts = np.take(residual, active[part], axis=1), values[active[part]].astype(np.float32)
         load /= _lengths(load)
+        relative = shifts / np.float32(values[size - 1])
         rates, change = chebyshev_steps(*_CYCLED), np.zeros_like(load)
         for left in reversed(range(cycles)):
-            cycle = solve_roughly(levels, coarsest, load, shifts / np.float32(values[size - 1]), size)
+            cycle = solve_roughly(levels, coarsest, load, relative, size)
             subtract_product(cycle, found, product(weighed.T, cycle))
             kept, rate = next(rates)
             change *= kept

@@ -13,7 +13,7 @@ from .dense import product
 from .eigenvalue import rough_largest_eigenvalue
 from .rows import Rows
 
-SMALL = 300  # unknowns that are solved whole in a hundredth of a second; three times as many, in a quarter
+SMALL, LARGE = 300, 900  # unknowns that are solved whole in a hundredth of a second, and in a quarter
 STRONG = (3e-3, 1e-2, 3e-2, 0.1)  # coupling over the diagonal from which unknowns may share an aggregate: about 20
 # by the first one, fewer by the others
 _ROUNDING = 1e-12  # of the largest diagonal entry: smaller ones are rounding error
@@ -143,8 +143,8 @@ def _single(matrix: sparse.csr_array) -> sparse.csr_array:
 def aggregates(matrix: Rows, diagonal: Floats, share: float, report: Report) -> tuple[Ints, Ints]:
     """Aggregate the unknowns of a matrix around roots, no two of which couple strongly.
 
-    Return the number of each unknown's part, (n,), and the root of each part, (m,), which couples strongly with all of
-    it.
+    Every row of the matrix stores its diagonal, zero or not. Return the number of each unknown's part, (n,), and the
+    root of each part, (m,), which couples strongly with all of it.
     """
 
     def strong(rows: slice, part: sparse.csr_array) -> tuple[Array, Array, Array]:
@@ -222,7 +222,7 @@ def approximate_inverse(matrix: sparse.csr_array, pool: ThreadPoolExecutor, repo
     `Rows`.
     """
     levels, last, _ = build_levels(matrix, np.ones(matrix.shape[0]), SMALL, 0, pool, report)
-    if not levels or last.shape[0] > 3 * SMALL:
+    if not levels or last.shape[0] > LARGE:
         return None
     for level in levels:
         _shorten(level)
