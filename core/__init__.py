@@ -1,4 +1,4 @@
-"""Mesh-free discrete Laplace-Beltrami operator on point clouds: numpy and scipy only, usable without Blender.
+"""Mesh-free discrete Laplace-Beltrami operator on point clouds, usable without Blender.
 
 `build_laplacian` makes the operator of a cloud, and nearly all else takes that operator, first. Here is what everyone
 needs; what the operator is for is in a namespace a topic:

@@ -29,7 +29,7 @@ def of_wheel(path):
     """
     with zipfile.ZipFile(path) as wheel:
         names = wheel.namelist()
-        texts = [wheel.read(name).decode() for name in names if re.search(r"\.dist-info/(.*/)?LICENSE\.txt$", name)]
+        texts = [wheel.read(name).decode() for name in names if re.search(r"\.dist-info/(.*/)?LICENSE(\.txt)?$", name)]
         boms = [json.loads(wheel.read(name)) for name in names if name.endswith(".cyclonedx.json")]
         (about,) = [wheel.read(name).decode() for name in names if name.endswith(".dist-info/METADATA")]
     if not texts:

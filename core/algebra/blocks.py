@@ -1,10 +1,13 @@
 """Work in blocks that fit the cache, on all cores: numpy and scipy let other threads run while they work on arrays."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from contextlib import contextmanager
+from threading import Lock
+from typing import Any, TypeVar
 
 import numpy as np
+from threadpoolctl import OpenBLASController, get_cached_controller
 
 from ..cores import cores
 from ..types import Array, Report
@@ -13,11 +16,44 @@ Part = TypeVar("Part")
 Result = TypeVar("Result")
 
 _BLOCK = 1 << 13  # rows of a few numbers, or of some dozens
+_LOCK = Lock()
+_limits: list[Any] = []  # of the threads of BLAS: the same one for each pool that is open
 
 
 def blocks(count: int, size: int) -> list[slice]:
     """Return the slices that divide a number of rows into blocks of one size."""
     return [slice(start, min(start + size, count)) for start in range(0, count, size)]
+
+
+@contextmanager
+def workers(most: int | None = None) -> Iterator[ThreadPoolExecutor]:
+    """Open a pool of a thread for each core, or of fewer, while BLAS starts none.
+
+    After each of its calls BLAS's own threads are awake for some hundredths of a second, and keep their cores from
+    these. They are limited for the whole process, until the last of all pools is closed.
+    """
+    with _LOCK:
+        _limits.append(_limits[0] if _limits else _from_any_thread(_one_thread))
+    try:
+        with ThreadPoolExecutor(min(cores(), most or cores())) as pool:
+            yield pool
+    finally:
+        with _LOCK:
+            limit = _limits.pop()
+            if not _limits:
+                _from_any_thread(limit.restore_original_limits)
+
+
+def _one_thread() -> Any:
+    return get_cached_controller().limit(limits=1, user_api="blas")
+
+
+def _from_any_thread(change: Callable[[], Result]) -> Result:
+    """Change how many threads BLAS has, which else only the thread may that did so first."""
+    OpenBLASController.clear_controlling_thread(force=True)
+    result = change()
+    OpenBLASController.clear_controlling_thread(force=True)
+    return result
 
 
 def on_all_cores(
@@ -44,7 +80,7 @@ def on_all_cores(
     if len(parts) < 2:
         return [function(part) for part in parts]
     results = []
-    with ThreadPoolExecutor(min(cores(), most or len(parts))) as pool:
+    with workers(min(most or len(parts), len(parts))) as pool:
         for result in pool.map(function, parts):
             results.append(result)
             report()

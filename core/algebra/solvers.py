@@ -1,7 +1,6 @@
 """Conjugate gradients: for symmetric equations, and for symmetric quadratics with lower bounds."""
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -11,9 +10,9 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator
 
-from ..cores import cores
 from ..errors import SolverError
 from ..types import Array, Floats, Progress
+from .blocks import workers
 from .hierarchy import approximate_inverse
 from .rows import Rows, part_size
 
@@ -69,7 +68,6 @@ def conjugate_gradients(
         Of several loads the greatest residual. Whether the matrix is definite is not judged.
     """
     single = load.ndim == 1
-    # Not by BLAS: its threads, once awake, take the cores from those of the products for some hundredths of a second.
     product: Callable[[Array, Array], Any] = partial(np.einsum, "i,i" if single else "ij,ij->j")
 
     def size(vectors: Array) -> Any:
@@ -106,7 +104,7 @@ def multigrid(matrix: sparse.csr_array) -> Iterator[LinearOperator | None]:
 
     None where unknowns are so few that the diagonal alone is faster, or where coarse versions do not help.
     """
-    with ThreadPoolExecutor(cores()) as pool:
+    with workers() as pool:
         yield approximate_inverse(matrix, pool, lambda: None) if matrix.shape[0] >= _FEW else None
 
 
@@ -154,7 +152,7 @@ def solve_symmetric(
     columns = np.atleast_2d(load.T)
     values = np.zeros_like(columns) if start is None else np.atleast_2d(start.T).copy()
     scaling, products = 1.0 / matrix.diagonal(), _STEPS if len(load) < _FEW else _PLAIN
-    with ThreadPoolExecutor(cores()) as pool:
+    with workers() as pool:
         for number, column in enumerate(columns):
             # Squares of loads in tiny or huge units would underflow or overflow; a power of two rounds nothing.
             unit = np.ldexp(1.0, np.frexp(np.abs(column).max(initial=0.0))[1])
@@ -179,7 +177,7 @@ def solve_columns(matrix: sparse.csr_array, loads: Floats, rtol: float, report: 
     The residual of each column falls to a share `rtol` of its load, or `SolverError` is raised. `report` is called with
     the share of the work that is done; it may raise `Cancelled`.
     """
-    with ThreadPoolExecutor(cores()) as pool:
+    with workers() as pool:
         rows = Rows(matrix, pool, lambda: report(0.0))
         inverse = approximate_inverse(matrix, pool, lambda: report(0.0))
         found = conjugate_gradients(

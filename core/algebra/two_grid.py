@@ -1,14 +1,13 @@
 """Equations on tangent vectors, solved as exactly where the solution is faint as where it is strong."""
 
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 import numpy as np
 from scipy import sparse
 
-from ..cores import cores
 from ..errors import SolverError
 from ..types import Array, Bools, Floats, Progress
+from .blocks import workers
 from .cholesky import factorize
 from .eigenvalue import rough_largest_eigenvalue
 from .factors import dissect
@@ -37,7 +36,7 @@ class TwoGrid:
     def __init__(self, matrix: sparse.csr_array, mass: Floats, points: Floats, report: Progress) -> None:
         self._matrix, diagonal = matrix, matrix.diagonal().real
         count = len(mass)
-        with ThreadPoolExecutor(cores()) as pool:
+        with workers() as pool:
 
             def rows(values: sparse.csr_array, fraction: float) -> Rows:
                 return Rows(values, pool, lambda: report("Equations", fraction))
@@ -72,7 +71,7 @@ class TwoGrid:
         zero on components without load. Without convergence `SolverError` is raised; `report` may raise `Cancelled`.
         """
         result = self._coarse(load)
-        with ThreadPoolExecutor(cores()) as pool:
+        with workers() as pool:
             for step in range(_STEPS):
                 matrix = Rows(self._matrix, pool, partial(report, "Directions", step / (step + 10.0)))
                 before = result

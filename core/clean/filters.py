@@ -14,9 +14,9 @@ from ..algebra import (
     chebyshev_terms,
     degree_needed,
     largest_eigenvalue,
+    workers,
 )
 from ..arguments import as_doubles, check_array, check_finite, check_switches, not_negative, real, whole
-from ..cores import cores
 from ..errors import PointCloudError
 from ..geometry import check_values
 from ..kernel import SECOND_MOMENT
@@ -280,7 +280,7 @@ def chebyshev_filter(
     report_done()
     columns = values.reshape(len(values), -1)
     filtered = respond(response, np.zeros(1))[0] * columns
-    with ThreadPoolExecutor(cores()) as pool:
+    with workers() as pool:
         order, root, multiply = corrected_operator(laplacian, dirichlet, raw, pool, report_done)
         top = largest_eigenvalue(lambda y: multiply(y[:, None])[:, 0], len(order))
         coefficients = _polynomial(response, top, largest)

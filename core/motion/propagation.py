@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any
 
@@ -21,8 +20,8 @@ from ..algebra import (
     factorize,
     largest_eigenvalue,
     on_all_cores,
+    workers,
 )
-from ..cores import cores
 from ..errors import InvalidPointsError
 from ..geometry import check_values
 from ..operator import LaplaceBeltrami, symmetric_form
@@ -149,7 +148,7 @@ class Propagator:
         """Return the sum of Chebyshev polynomials of rows, (k, m), each times its weight, a number or (k, k)."""
         report, done = progress or _silent, 0.0
         result = np.zeros_like(rows)
-        with ThreadPoolExecutor(cores()) as pool:
+        with workers() as pool:
             matrix = Rows(self._matrix, pool, lambda: report("Step", done))
 
             def product(values: Floats) -> Floats:

@@ -1,6 +1,5 @@
 """Eigenpairs of the operator, eq. (12) of the paper."""
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,9 +7,8 @@ from scipy import sparse
 from scipy.sparse.linalg import ArpackNoConvergence
 from scipy.spatial import cKDTree
 
-from ..algebra import Rows, coarse_to_fine, lift_lowest
+from ..algebra import Rows, coarse_to_fine, lift_lowest, workers
 from ..arguments import whole
-from ..cores import cores
 from ..errors import SolverError, TooFewPointsError, UnresolvedModesError
 from ..frozen import Frozen
 from ..kernel import inverse_ratio, symbol
@@ -119,7 +117,7 @@ def _missed(matrix: sparse.csr_array, values: Floats, vectors: Floats) -> Floats
     def subtract(rows: slice, image: Floats) -> None:
         image -= vectors[rows] * values
 
-    with ThreadPoolExecutor(cores()) as pool:
+    with workers() as pool:
         missed = Rows(matrix, pool, lambda: None).product(vectors, subtract)
     return np.sqrt(np.einsum("ij,ij->j", missed, missed))
 

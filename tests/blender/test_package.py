@@ -109,7 +109,7 @@ def test_blender_validates_zip(archive):
 def test_every_bundled_wheel_has_a_pinned_hash(archive, packed, tmp_path):
     wheels = [name for name in packed.namelist() if name.endswith(".whl")]
     sums = {package.sha256(Path(packed.extract(name, tmp_path))) for name in wheels}
-    assert len(sums) == len(wheels) == 5
+    assert len(sums) == len(wheels) == 6
     assert sums <= package.pinned_hashes()
 
 
@@ -117,6 +117,7 @@ PARTS = {  # of a wheel, some of whose licenses are to be found
     "laspy": ["SPDX:BSD-2-Clause", "SPDX:BSD-3-Clause"],
     "lazrs": ["SPDX:Apache-2.0", "SPDX:MIT"],
     "scipy": ["SPDX:BSD-3-Clause", "SPDX:GPL-3.0-or-later", "SPDX:LGPL-2.1-or-later"],
+    "threadpoolctl": ["SPDX:BSD-3-Clause"],
 }
 
 
@@ -132,17 +133,17 @@ def test_manifest_names_the_licenses_of_all_that_the_wheels_bring(packed, manife
                 (about,) = [wheel.read(item).decode() for item in wheel.namelist() if item.endswith("info/METADATA")]
             assert re.findall(r"^Requires-Dist: ([a-z_-]+)[^;]*$", about, re.MULTILINE) in ([], ["numpy"])
             seen.append(project)
-    assert sorted(seen) == ["laspy", "lazrs", "lazrs", "scipy", "scipy"]
+    assert sorted(seen) == ["laspy", "lazrs", "lazrs", "scipy", "scipy", "threadpoolctl"]
 
 
 def test_every_platform_and_python_has_its_pinned_wheels(manifest):
     names = {name for platform in manifest["platforms"] for name in package.wheel_names(platform)}
-    assert len(names) == len(manifest["wheels"]) == len(package.pinned_hashes()) == 15
+    assert len(names) == len(manifest["wheels"]) == len(package.pinned_hashes()) == 16
     for platform in manifest["platforms"]:
         wheels = [name.split("-")[::2][:2] for name in package.wheel_names(platform)]
         pythons = ["cp311"] if platform == "macos-x64" else ["cp311", "cp313"]
         compiled = [[project, python] for project in ("scipy", "lazrs") for python in pythons]
-        assert sorted(wheels) == sorted([*compiled, ["laspy", "py3"]])
+        assert sorted(wheels) == sorted([*compiled, ["laspy", "py3"], ["threadpoolctl", "py3"]])
 
 
 def test_it_asks_for_no_newer_blender_than_those_of_the_tests(manifest):
@@ -217,7 +218,8 @@ import bpy
 bpy.ops.wm.read_factory_settings(use_empty=True)
 bpy.ops.extensions.package_install_files(filepath=sys.argv[1], repo="user_default", enable_on_install=True)
 print("RESULT", *(name for name in sys.modules if ".meshfree_laplacian.core" in name))
-print("HEAVY", *(name for name in sys.modules if name.partition(".")[0] in ("scipy", "laspy", "lazrs")))
+HEAVY = "scipy", "threadpoolctl", "laspy", "lazrs"
+print("HEAVY", *(name for name in sys.modules if name.partition(".")[0] in HEAVY))
 bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=5)
 print("RUN", bpy.ops.meshfree.analyze(modes=0))
 print("THEN", len([name for name in sys.modules if name.partition(".")[0] == "scipy"]) > 100)

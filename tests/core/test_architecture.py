@@ -227,9 +227,9 @@ def test_public_packages_name_what_they_export_as_type_checkers_ask_for_it(packa
     assert [alias.name for alias in names if alias.asname != alias.name] == []
 
 
-def test_core_needs_numpy_and_scipy_only():
+def test_core_needs_numpy_scipy_and_threadpoolctl_only():
     """But for files of LAS; that it imports theirs when it reads, is among the tests of these."""
-    allowed = set(sys.stdlib_module_names) | {"numpy", "scipy"}
+    allowed = set(sys.stdlib_module_names) | {"numpy", "scipy", "threadpoolctl"}
     las = {("las_packages.py", name) for name in ("laspy", "lazrs")}
     wrong = [
         f"{file.name}: {name}"

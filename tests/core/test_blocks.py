@@ -1,9 +1,12 @@
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
+from threadpoolctl import get_cached_controller
 
 import core
 from benchmarks.samplings import fibonacci_sphere
-from core.algebra.blocks import blocks, on_all_cores
+from core.algebra.blocks import blocks, on_all_cores, workers
 
 
 @pytest.mark.parametrize(("count", "size"), [(10, 3), (9, 3), (2, 5), (0, 4)])
@@ -43,3 +46,43 @@ def test_the_same_bits_on_one_core(monkeypatch):
     one = core.build_laplacian(points)
     np.testing.assert_array_equal(one.areas, several.areas)
     np.testing.assert_array_equal(one.stiffness.data, several.stiffness.data)
+
+
+@pytest.fixture
+def three():
+    """Let BLAS have three threads, whatever the machine or its environment says."""
+    with get_cached_controller().limit(limits=3, user_api="blas"):
+        assert threads_of_blas() == {3}
+        yield
+
+
+def threads_of_blas():
+    return {library["num_threads"] for library in get_cached_controller().info() if library["user_api"] == "blas"}
+
+
+def test_blas_has_no_threads_while_ours_work(three):
+    with workers() as pool:
+        assert set().union(*pool.map(lambda part: threads_of_blas(), range(9))) == {1}
+        assert on_all_cores(lambda part: threads_of_blas(), [0, 1]) == [{1}, {1}]
+        assert threads_of_blas() == {1}
+    assert threads_of_blas() == {3}
+
+
+def test_blas_has_its_threads_again_after_an_error(three):
+    with pytest.raises(core.Cancelled), workers():
+        raise core.Cancelled
+    assert threads_of_blas() == {3}
+
+
+def test_blas_has_its_threads_again_after_the_last_of_several_pools(three):
+    """Those of two threads, of which the one that begins first ends first, and lives on."""
+    first, last = workers(), workers()
+    with ThreadPoolExecutor(1) as one, ThreadPoolExecutor(1) as other:
+        one.submit(first.__enter__).result()
+        other.submit(last.__enter__).result()
+        one.submit(first.__exit__, None, None, None).result()
+        assert threads_of_blas() == {1}
+        other.submit(last.__exit__, None, None, None).result()
+        assert threads_of_blas() == {3}
+        with workers():
+            assert threads_of_blas() == {1}

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-NEEDS = ("numpy", "scipy")
+NEEDS = ("numpy", "scipy", "threadpoolctl")
 FILES = ("laspy", "lazrs")
 
 
