@@ -1,18 +1,16 @@
 """Few eigenpairs of many unknowns: on coarse versions of the matrix first, then by Davidson's method in a block."""
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
 from scipy import sparse
 from scipy.linalg import eigh
 
-from ..cores import cores
 from ..types import Array, Floats, Ints
-from .blocks import blocks, on_all_cores
+from .blocks import blocks, on_all_cores, workers
 from .chebyshev import chebyshev_steps
-from .dense import product, subtract_product
+from .dense import multiply, product, subtract_product
 from .hierarchy import LARGE, SMALL, Known, Level, build_levels, smoothed, solve_roughly
 
 _DENSE = 4000  # in ten seconds; where the coarsest version has more, another solver is faster
@@ -30,7 +28,6 @@ _STEPS, _COARSE_STEPS = 24, 8  # at most; two to six are usual on the points, tw
 _COLUMNS = 40  # in a V-cycle at one time, at least: with 20, products take a quarter more time; with 72, an eighth less
 _ENTRIES = 1 << 24  # of these columns, up to which there may be more: of 200,000 points all of 50 modes
 _BLOCK = 1 << 11  # rows of vectors worked on at one time
-_TURNED = 1 << 14  # and multiplied with a dense matrix
 _PATIENCE = 12  # steps after which the block of vectors is widened, where it stalls
 
 
@@ -63,7 +60,7 @@ def coarse_to_fine(
     values, vectors : ndarray, (count,) and (n, count), or None
         Ascending, orthonormal.
     """
-    with ThreadPoolExecutor(cores()) as pool:
+    with workers() as pool:
         least = max(SMALL, min(20 * count, LARGE), 5 * count)
         levels, last, mass = build_levels(matrix, slowest, least, 3 * count, pool, report, scale)
         if not levels or last.shape[0] > max(least, _DENSE):
@@ -244,9 +241,12 @@ def _corrections(
 
 def _turn(vectors: Floats, basis: Floats, added: tuple[Array, Array] | None = None) -> None:
     """Compute ``vectors @ basis`` in place, and add the product of two other matrices."""
-    for rows in blocks(len(vectors), _TURNED):
-        turned = product(vectors[rows], basis)
-        vectors[rows] = turned if added is None else turned + product(added[0][rows], added[1])
+
+    def turn(rows: slice) -> None:
+        turned = multiply(vectors[rows], basis)
+        vectors[rows] = turned if added is None else turned + multiply(added[0][rows], added[1])
+
+    on_all_cores(turn, blocks(len(vectors), _BLOCK))
 
 
 def _residual(image: Floats, dual: Floats, values: Floats) -> tuple[Array, Floats]:

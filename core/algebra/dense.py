@@ -1,60 +1,79 @@
 """Dense matrices: products by scipy's BLAS, as numpy may be built without a fast one; inverses of many small ones."""
 
-from collections.abc import Callable
+from ctypes import CFUNCTYPE, byref, c_char_p, c_double, c_float, c_int64, c_void_p, py_object, pythonapi
 from typing import Any
 
 import numpy as np
-from scipy.linalg import get_blas_funcs
+from scipy.linalg import cython_blas
 
 from ..types import Array, Floats
 from .blocks import blocks, on_all_cores
 
-_WORK = 1 << 27  # multiplications in one call: it holds Python's lock for some hundredths of a second
-_ALONE = 1 << 18  # up to which OpenBLAS wakes no threads: these then keep a core for some hundredths of a second, awake
-_LEAST = 1 << 8  # rows, in calls of that many multiplications, that are worth a call
+_WORK = 1 << 23  # multiplications in one call: some thousandths of a second
 _BLOCK = 1 << 13  # small matrices
 
 
 def product(left: Array, right: Array) -> Array:
-    """Return ``left @ right`` of two matrices, (m, k) and (k, n), of one precision; fast if they are contiguous.
+    """Return ``left @ right`` of two matrices, (m, k) and (k, n), of one precision, on all cores.
 
-    Transposes and slices of rows are used as they are; other slices are copied.
+    Fast if one axis of each is contiguous; others are copied.
     """
     (m, k), n = left.shape, right.shape[1]
-    gemm = get_blas_funcs("gemm", (left, right))
-    if 0 < m * k * n <= _ALONE:
-        return _multiply(gemm, left, right)
-    result, longest = np.zeros((m, n), dtype=gemm.dtype), max(m, k)
-    for part in blocks(longest if result.size else 0, _rows(m * k * n // max(1, longest))):
-        if m >= k:
-            _multiply(gemm, left[part], right, c=result[part].T, overwrite_c=True)
-        else:
-            _multiply(gemm, left[:, part], right[part], c=result.T, beta=1.0, overwrite_c=True)
-    return result
+    size = max(1, _WORK * max(m, k) // max(1, m * k * n))
+    if m >= k:
+        result = np.empty((m, n), dtype=left.dtype)
+        on_all_cores(lambda rows: np.copyto(result[rows], multiply(left[rows], right)), blocks(m, size))
+        return result
+    sums = on_all_cores(lambda part: multiply(left[:, part], right[part]), blocks(k, size))
+    return sum(sums, np.zeros((m, n), dtype=left.dtype))
 
 
 def subtract_product(result: Array, left: Array, right: Array) -> None:
-    """Compute ``result -= left @ right`` in place, for a contiguous result, (m, n), of the precision of both."""
-    gemm, (m, n) = get_blas_funcs("gemm", (left, right)), result.shape
-    for part in blocks(m, _rows(left.shape[1] * n)):
-        _multiply(gemm, left[part], right, -1.0, beta=1.0, c=result[part].T, overwrite_c=True)
+    """Compute ``result -= left @ right`` in place, (m, n), on all cores."""
+
+    def subtract(rows: slice) -> None:
+        result[rows] -= multiply(left[rows], right)
+
+    on_all_cores(subtract, blocks(len(left), max(1, _WORK // max(1, right.size))))
 
 
-def _rows(width: int) -> int:
-    """Return how many rows are multiplied in one call, by the multiplications that each takes."""
-    alone = _ALONE // max(1, width)
-    return alone if alone >= _LEAST else max(1, _WORK // max(1, width))
+def multiply(left: Array, right: Array) -> Array:
+    """Return ``left @ right`` of two matrices, (m, k) and (k, n), of one precision, in this thread alone.
+
+    BLAS takes columns, and numpy has rows: it computes the transpose, as the product of the transposes.
+    """
+    (m, k), n, (gemm, number) = left.shape, right.shape[1], _GEMM[left.dtype.char]
+    result = np.zeros((m, n), dtype=left.dtype)
+    if m * k * n:
+        (right, flip_a, step_a), (left, flip_b, step_b) = (_in_columns(part, left.dtype) for part in (right, left))
+        sizes, (one, none) = [byref(c_int64(size)) for size in (n, m, k)], (byref(number(x)) for x in (1.0, 0.0))
+        a, b, c = (array.ctypes.data for array in (right, left, result))
+        gemm(flip_a, flip_b, *sizes, one, a, step_a, b, step_b, none, c, sizes[0])
+    return result
 
 
-def _multiply(gemm: Callable[..., Array], left: Array, right: Array, factor: float = 1.0, **settings: Any) -> Array:
-    """Compute the product as the transpose of that of the transposes, since BLAS takes columns, and numpy has rows."""
-    (a, flip_a), (b, flip_b) = _in_columns(right), _in_columns(left)
-    return gemm(factor, a, b, trans_a=flip_a, trans_b=flip_b, **settings).T
+def _in_columns(matrix: Array, dtype: Any) -> tuple[Array, bytes, Any]:
+    """Return a matrix, whether BLAS is to transpose it, and the step from one of its columns to the next."""
+    (rows, columns), size, steps = matrix.shape, matrix.itemsize, matrix.strides
+    if matrix.dtype == dtype and steps[0] == size and steps[1] >= size * rows:
+        return matrix, b"T", byref(c_int64(steps[1] // size))
+    if not (matrix.dtype == dtype and steps[1] == size and steps[0] >= size * columns):
+        matrix = np.array(matrix, dtype=dtype, order="C")
+    return matrix, b"N", byref(c_int64(matrix.strides[0] // matrix.itemsize))
 
 
-def _in_columns(matrix: Array) -> tuple[Array, bool]:
-    """Return a matrix, or its transpose, in the order of columns, and whether BLAS has to transpose it."""
-    return (matrix.T, False) if matrix.flags.c_contiguous else (matrix, True)
+def _routine(name: str) -> Any:
+    """Return a routine of scipy's BLAS that lets other threads run: those of `scipy.linalg.blas` hold Python's lock.
+
+    Its whole numbers have 32 bits, or 64: of small positive ones the former are the first half of the latter.
+    """
+    capsule = cython_blas.__pyx_capi__[name]
+    signature = CFUNCTYPE(c_char_p, py_object)(("PyCapsule_GetName", pythonapi))(capsule)
+    address = CFUNCTYPE(c_void_p, py_object, c_char_p)(("PyCapsule_GetPointer", pythonapi))(capsule, signature)
+    return CFUNCTYPE(None, *[c_void_p] * 13)(address)
+
+
+_GEMM = {"f": (_routine("sgemm"), c_float), "d": (_routine("dgemm"), c_double)}
 
 
 def inverses(matrices: Floats) -> Floats:

@@ -191,9 +191,9 @@ def test_eigenvectors_some_at_a_time_are_those_of_all_at_once(monkeypatch):
     monkeypatch.setattr(davidson, "_ENTRIES", 0)
     monkeypatch.setattr(davidson, "_STEPS", 7)  # six are enough; nine are needed without Chebyshev's acceleration
     found = []
-    for columns, rows in ((40, 1 << 14), (5, 700)):
+    for columns, rows in ((40, 1 << 11), (5, 700)):
         monkeypatch.setattr(davidson, "_COLUMNS", columns)
-        monkeypatch.setattr(davidson, "_TURNED", rows)
+        monkeypatch.setattr(davidson, "_BLOCK", rows)
         found.append(coarse_to_fine(matrix, np.ones(6000), 16, 1e-7, 0.0, lambda *_: None))
     (values, vectors), (others, parts) = found
     np.testing.assert_allclose(others, values, rtol=1e-9, atol=1e-12)
