@@ -39,9 +39,10 @@ def label_components(nearest: Nearest, usual: float | None = None) -> Ints:
     index = nearest.index[:, 1:]
     usual = float(np.median(gap_reach(nearest))) if usual is None else usual
     strict, loose = find_gaps(nearest, usual)
-    large = number_by_size(label_connected(index, strict), COUNT) >= 0
+    label = label_connected(index, strict)
+    large = number_by_size(label, COUNT) >= 0
     loose &= large[:, None] & large[index]
-    return number_large(label_connected(index, strict | loose), large)
+    return number_large(label_connected(index, loose, label), large)
 
 
 def find_gaps(nearest: Nearest, usual: float) -> tuple[Bools, Bools]:
@@ -58,11 +59,16 @@ def number_large(label: Ints, large: Bools) -> Ints:
     return result
 
 
-def label_connected(index: Ints, joined: Bools) -> Ints:
-    """Number the components of points whose neighbors, (m, k) int, are joined to them, (m, k) bool."""
-    label = np.arange(len(index), dtype=np.int32)
+def label_connected(index: Ints, joined: Bools, label: Ints | None = None) -> Ints:
+    """Number the components of points whose neighbors, (m, k) int, are joined to them, (m, k) bool.
+
+    Points with one label, (m,) int, if these are given, belong together anyway.
+    """
+    label = np.arange(len(index), dtype=np.int32) if label is None else label
     # By the nearest neighbors first, for speed: hardly any other edge still joins two components then.
     for some in (slice(0, NEXT), slice(NEXT, None)):
+        if label.max() == 0:
+            break
 
         def across(rows: slice, some: slice = some, label: Ints = label) -> Ints:
             other = label[index[rows, some]]
