@@ -150,6 +150,7 @@ def _symmetric(scaled: ScaledPoints, first: Ints, second: Ints, values: Floats, 
         return (spread @ (half + half.T + alone) @ spread.T).tocsr()
     caller = scaled.first.astype(np.int32)
     ends = (np.concatenate([caller[end], caller]) for end in (first, second))
-    half = sparse.csr_array((np.concatenate([values, 0.5 * own]), tuple(ends)), shape=(n, n))
-    half = half.T.tocsr()  # transposing sorts the columns, which makes the sum fast
+    entries = sparse.coo_array((np.concatenate([values, 0.5 * own]), tuple(ends)), shape=(n, n))
+    entries.has_canonical_format = True  # no place twice: there is nothing to sum
+    half = entries.tocsr().T.tocsr()  # transposing sorts the columns, which makes the sum fast
     return half + half.T.tocsr()
