@@ -25,7 +25,8 @@ def disc_radii(nearest: Nearest, normals: Floats, cells: Cells) -> Floats:
     points and sparse ones, the disc of a sparse point covers. No disc is larger than three times the spacing around it.
     Normals, (m, 3), are those that the cells were measured with.
     """
-    usual, radii = np.median(nearest.spacing[nearest.index[:, : FEW + 1]], axis=1), cells.radius.copy()
+    around, radii = nearest.index[:, : FEW + 1], cells.radius.copy()
+    usual = by_blocks(lambda rows: np.median(nearest.spacing[around[rows]], axis=1), len(around))
     spacing = np.maximum(usual, nearest.spacing)  # of a sparse point beside dense ones its own
     rows = np.flatnonzero(radii > _AT_EDGE * usual)
     axes = frames(normals[rows])[:, :, 1:]

@@ -9,6 +9,7 @@ from ..algebra import by_blocks
 from ..arguments import as_array, as_doubles
 from ..errors import InvalidPointsError
 from ..types import Array, Bools, Floats, Ints
+from .distances import dots
 from .nearest import Nearest
 
 NEIGHBORS = 12
@@ -109,7 +110,8 @@ def propagate_signs(nearest: Nearest, normals: Floats) -> tuple[Floats, sparse.c
     first, second = near_edges(nearest)
     cosine = np.abs(mirrored_cosine(points, normals, first, second))
     cost = 1.0 + 1e-9 - np.minimum(cosine, 1.0)  # csgraph reads a zero cost as no edge
-    tree = minimum_spanning_tree(sparse.csr_array((cost, (first, second)), shape=(n, n)))
+    start = np.searchsorted(first, np.arange(n + 1, dtype=np.int32)).astype(np.int32)
+    tree = minimum_spanning_tree(sparse.csr_array((cost, second.astype(np.int32), start), shape=(n, n)))
     graph = tree + tree.T
     component = connected_components(graph, directed=False)[1]
 
@@ -137,11 +139,11 @@ def near_edges(nearest: Nearest) -> tuple[Ints, Ints]:
 def mirrored_cosine(points: Floats, normals: Floats, first: Ints, second: Ints) -> Floats:
     """Cosine between the second normal and the mirror image of the first in the plane halfway between the points."""
 
+    place, normal = points.T.copy(), normals.T.copy()
+
     def measure(part: slice) -> Floats:
-        chord = points[second[part]] - points[first[part]]
-        chord /= np.linalg.norm(chord, axis=1)[:, None]
-        left, right = normals[first[part]], normals[second[part]]
-        along = np.einsum("ij,ij->i", chord, left) * np.einsum("ij,ij->i", chord, right)
-        return np.einsum("ij,ij->i", left, right) - 2.0 * along
+        one, other = first[part], second[part]
+        chord, left, right = place[:, other] - place[:, one], normal[:, one], normal[:, other]
+        return dots(left, right) - 2.0 * dots(chord, left) * dots(chord, right) / dots(chord, chord)
 
     return by_blocks(measure, len(first))

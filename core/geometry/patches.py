@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 from scipy import sparse
 
+from ..algebra import on_all_cores
 from ..types import Array, Floats, Ints
 
 _PAIRS = 1 << 16  # of a patch, about: of fewer, and Python's share of the work grows
@@ -55,7 +56,7 @@ def _taken(values: Array, places: Ints) -> Array:
 def divide_pairs(start: Ints, second: Ints) -> list[Patch]:
     """Divide pairs into patches, by where those of each first point start, (m + 1,), and their second points."""
     cuts = np.unique(np.searchsorted(start, np.append(np.arange(0, start[-1], _PAIRS), start[-1])))
-    return [_patch(start[low : high + 1], second, low) for low, high in pairwise(cuts)]
+    return on_all_cores(lambda cut: _patch(start[cut[0] : cut[1] + 1], second, cut[0]), list(pairwise(cuts)))
 
 
 def _patch(start: Ints, second: Ints, low: int) -> Patch:

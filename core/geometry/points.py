@@ -82,7 +82,7 @@ def scale_points(points: Floats, decisions: Decisions | None = None) -> ScaledPo
     scale = decisions.settle("scale", lambda: float(np.sqrt(np.mean(np.sort(np.sum(centered**2, axis=1))))))
     if scale > 0.0:
         centered /= scale
-    distinct, first, inverse = _merge(centered)
+    distinct, first, inverse, order = _merge(centered)
     copies = np.bincount(inverse)
     if len(distinct) < FEWEST_OF_SURFACE:
         among = f" among {len(points)}" if len(distinct) < len(points) else ""
@@ -95,25 +95,25 @@ def scale_points(points: Floats, decisions: Decisions | None = None) -> ScaledPo
         raise NotASurfaceError(
             f"All {len(points)} points lie on a straight line, so they have no area. Use points of a surface."
         )
-    order = cKDTree(distinct).indices
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
     return ScaledPoints(distinct[order], scale, rank[inverse], copies[order], first[order])
 
 
-def _merge(points: Floats) -> tuple[Floats, Ints, Ints]:
+def _merge(points: Floats) -> tuple[Floats, Ints, Ints, Ints]:
     """Take points at one place, in scaled coordinates, as one.
 
-    Return the m distinct ones, the first point at each of their places, (m,) int, and the place of each point, (n,)
-    int.
+    Return the m distinct ones, the first point at each of their places, (m,) int, the place of each point, (n,) int,
+    and an order in which places follow each other that are near, (m,) int.
     """
     order = np.lexsort(points.T[::-1])
     ordered = points[order]
     new = np.append(True, (ordered[1:] != ordered[:-1]).any(axis=1))
     distinct, first, inverse = ordered[new], order[new], np.empty_like(order)
     inverse[order] = np.cumsum(new) - 1
-    while len(distinct) > 1:
-        distance, near = cKDTree(distinct).query(distinct, k=2, distance_upper_bound=_SAME, workers=cores())
+    while True:
+        tree = cKDTree(distinct)
+        distance, near = tree.query(distinct, k=2, distance_upper_bound=_SAME, workers=cores())
         close = np.flatnonzero(np.isfinite(distance[:, 1]))
         if not len(close):
             break
@@ -125,7 +125,7 @@ def _merge(points: Floats) -> tuple[Floats, Ints, Ints]:
             connected_components(joined, directed=False)[1], return_index=True, return_inverse=True
         )
         distinct, first, inverse = distinct[kept], first[kept], place[inverse]
-    return distinct, first, inverse
+    return distinct, first, inverse, tree.indices
 
 
 def as_mask(chosen: ArrayLike, count: int) -> Bools:

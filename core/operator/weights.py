@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..algebra import by_blocks, chebyshev_steps, eliminate, on_all_cores
+from ..algebra import blocks, chebyshev_steps, eliminate, on_all_cores
 from ..geometry import LARGEST, MET, TERMS, Cloud, EdgeTerms, Patch, arc_ahead, dots, frames, put_terms
 from ..kernel import SECOND_MOMENT
 from ..types import Floats, Ints, Report
@@ -16,6 +16,7 @@ from .curvature import second_moment, uneven
 
 _ROUNDS = 16  # of the solver, at most
 _SMALLEST = 1e-6  # residual of the moments that is solved for: by a larger one, results would change with the origin
+_BLOCK = 1 << 13  # points worked on at one time
 _FASTEST = 2.5  # bound of the preconditioned eigenvalues: 2, and a margin, as the equations change on the way
 
 
@@ -69,8 +70,8 @@ def balance_weights(
     """
     lengths = cloud.pairs.lengths
     moments = _Moments(cloud, distance, weights, 4.0 * areas * _trace(cloud, weights, areas) / lengths**2, report)
-    goal = np.zeros((len(areas), TERMS))
-    goal[:, 0] = 1.0
+    goal = np.zeros((TERMS, len(areas)))
+    goal[0] = 1.0
     terms, step = np.zeros_like(goal), np.zeros_like(goal)
     slowest = _FASTEST / (1.0 + 0.25 * _ROUNDS**2)  # so many rounds reduce its component to 1 / cosh(4)
     rates = chebyshev_steps(slowest, _FASTEST)
@@ -80,25 +81,26 @@ def balance_weights(
         else:
             found = moments.of(terms)
         missing = goal - found
-        residual = np.linalg.norm(missing, axis=1)
+        residual = np.sqrt(dots(missing, missing))
         if number == _ROUNDS or residual.max() < _SMALLEST:
             break
         kept, rate = next(rates) if number else (0.0, 0.5)
         step = _next_step(step, kept, rate, inverse, missing - MET * terms)
-        step[residual < _SMALLEST] = 0.0
+        step[:, residual < _SMALLEST] = 0.0
         terms += step
     return Balance(moments.factor, residual)
 
 
 def _next_step(before: Floats, kept: float, rate: float, inverse: Floats, gradient: Floats) -> Floats:
-    """Return the steps of the coefficients of points, (m, 5), from those before, of length one at most."""
+    """Return the steps of the coefficients of points, (5, m), from those before, of length one at most."""
+    result = np.empty_like(before)
 
-    def change(rows: slice) -> Floats:
-        step = kept * before[rows] + rate * np.einsum("iab,ib->ia", inverse[rows], gradient[rows])
-        step /= np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1.0)
-        return step
+    def change(rows: slice) -> None:
+        step = kept * before[:, rows] + rate * np.einsum("abm,bm->am", inverse[:, :, rows], gradient[:, rows])
+        np.divide(step, np.maximum(np.sqrt(dots(step, step)), 1.0), out=result[:, rows])
 
-    return by_blocks(change, len(before))
+    on_all_cores(change, blocks(before.shape[1], _BLOCK))
+    return result
 
 
 def _trace(cloud: Cloud, weights: Floats, areas: Floats) -> Floats:
@@ -154,11 +156,10 @@ class _Moments:
         self._at_edges = {patch.pairs.start: found for patch, found in zip(pairs.patches, at_edges, strict=True)}
 
     def of(self, terms: Floats) -> Floats:
-        """Return the moments of the weights times their factors, (m, 5); those of the kernel are (1, 0, 0, 0, 0).
+        """Return the moments of the weights times their factors, (5, m); those of the kernel are (1, 0, 0, 0, 0).
 
-        The factors are those of polynomials with these coefficients, (m, 5), and kept.
+        The factors are those of polynomials with these coefficients, (5, m), and kept.
         """
-        terms = terms.T.copy()
 
         def weighted(patch: Patch) -> Floats:
             basis = self._basis(patch)
@@ -168,8 +169,8 @@ class _Moments:
         return self._sums(weighted, TERMS)
 
     def with_inverse(self, terms: Floats) -> tuple[Floats, Floats]:
-        """Return the moments, and the inverse Hessian of the entropy by the coefficients of each point, (m, 5, 5)."""
-        places, terms = [(i, j) for i in range(TERMS) for j in range(i + 1)], terms.T.copy()
+        """Return the moments, and the inverse Hessian of the entropy by the coefficients of each point, (5, 5, m)."""
+        places = [(i, j) for i in range(TERMS) for j in range(i + 1)]
 
         def products(patch: Patch) -> list[list[Floats]]:
             basis = self._basis(patch)
@@ -179,18 +180,20 @@ class _Moments:
 
         left, right = np.transpose(places)
         sums = self._sums(products, TERMS + len(places))
+        inverse = np.empty((TERMS, TERMS, sums.shape[1]))
 
-        def invert(rows: slice) -> Floats:
+        def invert(rows: slice) -> None:
             curvature = np.empty((TERMS, TERMS, rows.stop - rows.start))
-            curvature[left, right] = curvature[right, left] = 0.5 * sums[rows, TERMS:].T
+            curvature[left, right] = curvature[right, left] = 0.5 * sums[TERMS:, rows]
             curvature[range(TERMS), range(TERMS)] += MET
-            return np.moveaxis(eliminate(curvature), -1, 0)
+            inverse[:, :, rows] = eliminate(curvature)
 
-        return sums[:, :TERMS], by_blocks(invert, len(sums))
+        on_all_cores(invert, blocks(sums.shape[1], _BLOCK))
+        return sums[:TERMS], inverse
 
     def _sums(self, values: Callable[[Patch], Any], count: int) -> Floats:
-        """Return the sums of quantities of pairs at both ends, in the unit, (m, count)."""
-        return (self._pairs.over_ends(values, count, self._report) / self._unit).T
+        """Return the sums of quantities of pairs at both ends, in the unit, (count, m)."""
+        return self._pairs.over_ends(values, count, self._report) / self._unit
 
     def _basis(self, patch: Patch) -> Floats:
         """Return the terms of the pairs of a patch, (2, 5, pairs), as each end sees them."""
