@@ -10,7 +10,7 @@ from scipy.linalg.lapack import dpotrf, dtrtri
 from ..errors import SolverError
 from ..types import Floats, Ints
 from .blocks import blocks
-from .dense import product
+from .dense import multiply
 
 _BANDS = 6  # of columns by which a lower triangle is added: less work than the whole square
 _WIDEST = 512  # unknowns that are eliminated at once, so that no step takes long
@@ -75,11 +75,11 @@ def factorize(
                 f"The equations of {count} points have no single solution. Fix some points on every component."
             )
         inverse = dtrtri(own, lower=1)[0]
-        below = product(front[width:, :width], inverse.T)
+        below = multiply(front[width:, :width], inverse.T)
         factors.append(start, end, rows, inverse, below)
         if len(rows):
             left = front[width:, width:]
-            left -= product(below, below.T)
+            left -= multiply(below, below.T)
             children[parent[number]].append((rows, left))
         report(done[number])
     return factors.solve
@@ -130,15 +130,15 @@ class Factors:
 
     def append(self, start: int, end: int, rows: Ints, inverse: Floats, below: Floats) -> None:
         """Add the next part: its unknowns from start to end, the later rows, the inverse factor, and that below it."""
-        self._parts.append((start, end, rows, np.concatenate([inverse, -product(below, inverse)])))
+        self._parts.append((start, end, rows, np.concatenate([inverse, -multiply(below, inverse)])))
 
     def solve(self, right: Floats) -> Floats:
         """Solve for a right-hand side, (m,) or (m, k)."""
         values = np.array(np.reshape(right, (self._count, -1)).T, dtype=np.float64, order="C")
         for start, end, rows, part in self._parts:
-            found = product(values[:, start:end], part.T)
+            found = multiply(values[:, start:end], part.T)
             values[:, start:end] = found[:, : end - start]
             values[:, rows] += found[:, end - start :]
         for start, end, rows, part in reversed(self._parts):
-            values[:, start:end] = product(np.concatenate([values[:, start:end], values[:, rows]], axis=1), part)
+            values[:, start:end] = multiply(np.concatenate([values[:, start:end], values[:, rows]], axis=1), part)
         return values.T.reshape(np.shape(right))

@@ -9,17 +9,19 @@ from scipy.linalg import cython_blas
 from ..types import Array, Floats
 from .blocks import blocks, on_all_cores
 
-_WORK = 1 << 23  # multiplications in one call: some thousandths of a second
+_WORK = 1 << 24  # multiplications that a core does at one time: in some thousandths of a second
 _BLOCK = 1 << 13  # small matrices
 
 
 def product(left: Array, right: Array) -> Array:
-    """Return ``left @ right`` of two matrices, (m, k) and (k, n), of one precision, on all cores.
+    """Return ``left @ right`` of two matrices, (m, k) and (k, n), one of which is long, of one precision, on all cores.
 
     Fast if one axis of each is contiguous; others are copied.
     """
     (m, k), n = left.shape, right.shape[1]
-    size = max(1, _WORK * max(m, k) // max(1, m * k * n))
+    size = max(1, _WORK // max(1, min(m, k) * n))
+    if max(m, k) <= size:
+        return multiply(left, right)
     if m >= k:
         result = np.empty((m, n), dtype=left.dtype)
         on_all_cores(lambda rows: np.copyto(result[rows], multiply(left[rows], right)), blocks(m, size))
@@ -38,11 +40,13 @@ def subtract_product(result: Array, left: Array, right: Array) -> None:
 
 
 def multiply(left: Array, right: Array) -> Array:
-    """Return ``left @ right`` of two matrices, (m, k) and (k, n), of one precision, in this thread alone.
+    """Return ``left @ right`` of two matrices, (m, k) and (k, n), of one precision, by one call of BLAS.
 
     BLAS takes columns, and numpy has rows: it computes the transpose, as the product of the transposes.
     """
-    (m, k), n, (gemm, number) = left.shape, right.shape[1], _GEMM[left.dtype.char]
+    (m, k), (rows, n), (gemm, number) = left.shape, right.shape, _GEMM[left.dtype.char]
+    if rows != k:  # BLAS would read what is beyond
+        raise ValueError(f"Matrices of the shapes {left.shape} and {right.shape} have no product.")
     result = np.zeros((m, n), dtype=left.dtype)
     if m * k * n:
         (right, flip_a, step_a), (left, flip_b, step_b) = (_in_columns(part, left.dtype) for part in (right, left))

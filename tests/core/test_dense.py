@@ -7,7 +7,7 @@ from core.algebra import dense
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("work", [1, 1000, 1 << 23])
+@pytest.mark.parametrize("work", [1, 1000, 1 << 24])
 @pytest.mark.parametrize(
     ("m", "k", "n"),
     [(500, 7, 5), (7, 500, 5), (6, 6, 6), (1, 1, 1), (1, 9, 1), (9, 1, 1), (3, 4, 90), (0, 3, 2), (3, 0, 2), (2, 3, 0)],
@@ -56,8 +56,13 @@ def test_product_of_two_precisions_has_that_of_the_first():
     np.testing.assert_allclose(single, left @ right, rtol=0, atol=1e-5)
 
 
+def test_matrices_that_do_not_fit_have_no_product():
+    with pytest.raises(ValueError, match=r"shapes \(3, 4\) and \(5, 2\)"):
+        dense.product(np.ones((3, 4)), np.ones((5, 2)))
+
+
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("work", [1, 1000, 1 << 23])
+@pytest.mark.parametrize("work", [1, 1000, 1 << 24])
 def test_a_product_is_subtracted_in_place(monkeypatch, dtype, work):
     monkeypatch.setattr(dense, "_WORK", work)
     rng = np.random.default_rng(0)
