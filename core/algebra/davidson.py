@@ -219,7 +219,8 @@ def _corrections(
     level, found = levels[0], _single(vectors)
     weighed = found if level.mass is None else _single(dual)
     result = np.zeros((len(found), len(active)), dtype=np.float32)
-    for part in blocks(len(active), max(_COLUMNS, _ENTRIES // len(found))):
+    turns = -(-len(active) // max(_COLUMNS, _ENTRIES // len(found)))
+    for part in blocks(len(active), -(-len(active) // max(1, turns)) or 1):
         load, shifts = np.take(residual, active[part], axis=1), values[active[part]].astype(np.float32)
         load /= _lengths(load)
         relative = shifts / np.float32(values[size - 1])

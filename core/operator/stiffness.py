@@ -152,5 +152,7 @@ def _symmetric(scaled: ScaledPoints, first: Ints, second: Ints, values: Floats, 
     ends = (np.concatenate([caller[end], caller]) for end in (first, second))
     entries = sparse.coo_array((np.concatenate([values, 0.5 * own]), tuple(ends)), shape=(n, n))
     entries.has_canonical_format = True  # no place twice: there is nothing to sum
-    half = entries.tocsr().T.tocsr()  # transposing sorts the columns, which makes the sum fast
+    half = entries.tocsr()
+    del entries, ends  # large
+    half = half.T.tocsr()  # transposing sorts the columns, which makes the sum fast
     return half + half.T.tocsr()
