@@ -51,6 +51,8 @@ def test_the_same_bits_on_one_core(monkeypatch):
 @pytest.fixture
 def three():
     """Let BLAS have three threads, whatever the machine or its environment says."""
+    if not threads_of_blas():
+        pytest.skip("this BLAS does not let its threads be counted, such as that of macOS")
     with get_cached_controller().limit(limits=3, user_api="blas"):
         assert threads_of_blas() == {3}
         yield
