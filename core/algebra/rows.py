@@ -24,7 +24,7 @@ class Rows:
     """
 
     def __init__(self, matrix: sparse.csr_array, pool: ThreadPoolExecutor, report: Report) -> None:
-        self._map, self._report, self._count, self._dtype = pool.map, report, matrix.shape[0], matrix.dtype
+        self._report, self._count, self._dtype = report, matrix.shape[0], matrix.dtype
         starts = np.append(np.arange(0, max(matrix.nnz, 1), part_size(matrix.nnz)), matrix.nnz)
         cuts = np.unique(np.append(np.searchsorted(matrix.indptr[:-1], starts[:-1]), matrix.shape[0]))
         self._slices = [slice(first, last) for first, last in pairwise(cuts)]
@@ -36,6 +36,7 @@ class Rows:
             # Set afterwards, for the constructor would copy a small slice of an array.
             part.data, part.indices, part.indptr = matrix.data[entries], matrix.indices[entries], pointers - pointers[0]
             self._parts.append(part)
+        self._map: Callable[..., Iterator[Any]] = pool.map if len(self._parts) > 1 else map  # to no other thread
 
     def __matmul__(self, other: Any) -> Any:
         """Multiply with an array, (m, k), or a sparse one."""
