@@ -220,7 +220,7 @@ def _corrections(
     weighed = found if level.mass is None else _single(dual)
     result = np.zeros((len(found), len(active)), dtype=np.float32)
     turns = -(-len(active) // max(_COLUMNS, _ENTRIES // len(found)))
-    for part in blocks(len(active), -(-len(active) // max(1, turns)) or 1):
+    for part in blocks(len(active), -(-len(active) // turns)):
         load, shifts = np.take(residual, active[part], axis=1), values[active[part]].astype(np.float32)
         load /= _lengths(load)
         relative = shifts / np.float32(values[size - 1])

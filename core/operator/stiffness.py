@@ -153,6 +153,6 @@ def _symmetric(scaled: ScaledPoints, first: Ints, second: Ints, values: Floats, 
     entries = sparse.coo_array((np.concatenate([values, 0.5 * own]), tuple(ends)), shape=(n, n))
     entries.has_canonical_format = True  # no place twice: there is nothing to sum
     half = entries.tocsr()
-    del entries, ends  # large
+    del entries  # large
     half = half.T.tocsr()  # transposing sorts the columns, which makes the sum fast
     return half + half.T.tocsr()
