@@ -47,7 +47,7 @@ from .pairs import Pairs
 from .patches import Patch
 from .points import FEWEST, as_indices, as_mask, check_points, check_values, scale_points
 from .prolongation import Prolongation, balanced_weights
-from .quadrics import CURVED, MANY, check_surface, count_curves, frames, roundness
+from .quadrics import CURVED, MANY, check_surface, count_curves, frames, lengthened, roundness
 from .rounding import find_rounding, smooth_rounded
 from .rows import look_across_rows
 from .sample import Sample

@@ -13,7 +13,7 @@ from .boundary import Boundary
 from .distances import arc_ahead, arc_squared, bent_ways, heights_of_ends
 from .edges import Sides
 from .nearest import COUNT, Nearest
-from .quadrics import CURVED, along, chords, components, frames
+from .quadrics import CURVED, along, chords, components, frames, lengthened
 from .sheets import on_sheet
 
 _BLOCK = 1 << 12
@@ -148,13 +148,13 @@ def _cuts(
         squared[edged], ahead[edged] = bent_ways(distance[edged] ** 2, *heights, turn, sure[edged])
     for step, normal in zip(chord, components(normals, index), strict=True):
         step += side * ahead * normal
-    step = np.stack([along(chord, axis) for axis in frame.transpose(2, 1, 0)])
+    step = [along(chord, axis) for axis in frame.transpose(2, 1, 0)]
     length = 0.5 * np.sqrt(squared) * (1.0 + np.clip(gaussian_curvature[rows, None] * squared / 12.0, -CURVED, CURVED))
     length = np.maximum(length, _CLOSEST * nearest.spacing[rows, None])
-    cuts = step * (counted / (np.maximum(np.hypot(*step), 1e-300) * length))
+    cuts = np.stack(lengthened(*step, counted / length), axis=2)
     inside = np.maximum(boundary.distance[rows], _AT_BOUNDARY * nearest.spacing[rows, None])
     outward = np.einsum("iac,ick->iak", boundary.outward[rows], frame) / inside[:, :, None]
-    cuts = np.concatenate([np.moveaxis(cuts, 0, 2), outward], axis=1)
+    cuts = np.concatenate([cuts, outward], axis=1)
     # Of a small component all points are seen, and nothing is known of what lies further away than they do.
     return cuts, np.sqrt(np.max(squared, axis=1, where=joined, initial=0.0))
 

@@ -12,7 +12,7 @@ from ..kernel import SUPPORT, pair_kernel
 from ..types import Floats, Ints
 from .boundary import Boundary
 from .nearest import Nearest
-from .quadrics import along, chords, frames, gathered
+from .quadrics import along, chords, frames, gathered, lengthened
 from .sheets import on_sheet
 
 TERMS = 5  # of a point: trace of the second moment, first moment (2), the rest of the second (2)
@@ -54,12 +54,13 @@ class EdgeTerms:
 def put_terms(x: Floats, y: Floats, terms: Floats) -> None:
     """Compute the terms of offsets, in units of h: ``x^2 + y^2, x, y, x^2 - y^2, 2 x y``, into (5, ...)."""
     square, first, second, difference, product = terms
-    first[:], second[:] = x, y
-    np.multiply(x, x, out=square)
-    np.multiply(y, y, out=product)
+    first[:], second[:] = x, y  # in the precision of the terms: to convert at each step takes longer than the steps
+    np.multiply(first, first, out=square)
+    np.multiply(second, second, out=product)
     np.subtract(square, product, out=difference)
     square += product
-    np.multiply(2.0 * x, y, out=product)
+    np.multiply(first, second, out=product)
+    product *= 2.0
 
 
 def least_error(
@@ -100,9 +101,8 @@ def least_error(
         distance = distance / lengths_here
         chord = chords(nearest.points, rows, index)
         x, y = (along(chord, axis[:, rows]) for axis in tangents)
-        size = distance / np.maximum(np.hypot(x, y), 1e-300)
-        terms = np.empty((TERMS, *x.shape))
-        put_terms(x * size, y * size, terms)
+        terms = np.empty((TERMS, *x.shape), dtype=np.float32)
+        put_terms(*lengthened(x, y, distance), terms)
         weights = pair_kernel(distance)
         beside = np.flatnonzero(near[rows])
         if len(beside):
@@ -115,7 +115,7 @@ def least_error(
             weights[beside] += pair_kernel(np.minimum(image, SUPPORT)).sum(axis=2)
             terms[:, beside] = np.reshape(of_edge, (TERMS, len(beside), width))
         weights *= density / (4.0 * lengths_here**2)
-        return _solve(terms.astype(np.float32), weights.astype(np.float32))
+        return _solve(terms, weights.astype(np.float32))
 
     on_all_cores(measure, blocks(len(rows), _BLOCK))
     return result

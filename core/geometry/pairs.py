@@ -18,6 +18,7 @@ Ends: TypeAlias = Sequence[Sequence[Floats]] | Floats  # quantities of pairs at 
 
 _ROWS = 1 << 12  # points whose pairs are searched for at one time, at most
 _CANDIDATES = 1 << 20  # neighbors that a core looks at at one time meanwhile, about
+_SAMPLED = 16  # every which of some points is asked how many neighbors it has
 _GROUPS = 4  # groups of points by their radii, for each doubling of it
 
 
@@ -55,11 +56,14 @@ class Pairs:
             first, second = values(patch)
             return patch.over_first(*first), patch.over_second(*second)
 
-        total = np.zeros((count, len(self.points)))
-        for patch, (first, second) in zip(self.patches, on_all_cores(sums, self.patches, report), strict=True):
-            for row, own, other in zip(total, first, second, strict=True):  # both axes at once take three times as long
-                row[patch.rows] += own
-                row[patch.columns] += other
+        total, found = np.zeros((count, len(self.points))), on_all_cores(sums, self.patches, report)
+
+        def add(row: int) -> None:  # both axes at once take three times as long
+            for patch, (first, second) in zip(self.patches, found, strict=True):
+                total[row][patch.rows] += first[row]
+                total[row][patch.columns] += second[row]
+
+        on_all_cores(add, range(count))
         return total
 
     @functools.cached_property
@@ -70,9 +74,8 @@ class Pairs:
     @functools.cached_property
     def start(self) -> Ints:
         """Where the pairs of each first point start, (m + 1,)."""
-        start: Ints = np.zeros(len(self.points) + 1, dtype=np.int32 if len(self.first) < 2**31 else np.int64)
-        np.cumsum(np.bincount(self.first, minlength=len(self.points)), out=start[1:])
-        return start
+        start: Ints = np.searchsorted(self.first, np.arange(len(self.points) + 1, dtype=self.first.dtype))
+        return start.astype(np.int32 if len(self.first) < 2**31 else np.int64)
 
 
 def find_pairs(tree: cKDTree, lengths: Floats, report: Report = lambda: None) -> list[Array]:
@@ -86,7 +89,8 @@ def find_pairs(tree: cKDTree, lengths: Floats, report: Report = lambda: None) ->
 
     def search(rows: Ints) -> None:
         here, some = radii[rows], cKDTree(tree.data[rows], balanced_tree=False, compact_nodes=False)
-        if len(rows) > 1 and some.count_neighbors(tree, here.max()) > _CANDIDATES:
+        few = cKDTree(tree.data[rows[::_SAMPLED]])
+        if len(rows) > 1 and _SAMPLED * few.count_neighbors(tree, here.max()) > _CANDIDATES:
             for half in np.array_split(rows, 2):
                 search(half)
             return

@@ -4,6 +4,7 @@ import numpy as np
 from scipy import sparse
 
 from ..algebra import blocks, on_all_cores
+from ..geometry import lengthened
 from ..types import Array, Floats, Report
 
 _BLOCK = 1 << 15  # pairs worked on at one time, so that they stay in the cache
@@ -72,8 +73,7 @@ def connection_laplacian(
         across = _dot(axis, left) / np.where(cosine > 0.0, 1.0 + cosine, 1.0)
         axis -= across * right  # the frame has no component along the other normal
         x, y = _dot(axis, real.take(i, axis=1)), _dot(axis, imaginary.take(i, axis=1))
-        size = np.where(cosine > 0.0, -weight[block] / np.maximum(np.hypot(x, y), 1e-300), 0.0)
-        entries[block].real, entries[block].imag = size * x, size * y
+        entries[block].real, entries[block].imag = lengthened(x, y, np.where(cosine > 0.0, -weight[block], 0.0))
 
     on_all_cores(measure, blocks(len(first), _BLOCK), report)
     kept = np.flatnonzero(entries)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..algebra import blocks, chebyshev_steps, eliminate, on_all_cores
-from ..geometry import LARGEST, MET, TERMS, Cloud, EdgeTerms, Patch, arc_ahead, dots, frames, put_terms
+from ..geometry import LARGEST, MET, TERMS, Cloud, EdgeTerms, Patch, arc_ahead, dots, frames, lengthened, put_terms
 from ..kernel import SECOND_MOMENT
 from ..types import Floats, Ints, Report
 from .curvature import second_moment, uneven
@@ -145,8 +145,7 @@ class _Moments:
             offsets = chord + change * right, change * left - chord
             for stored, end, offset in zip(self._offsets, ends, offsets, strict=True):
                 x, y = (dots(offset, end(axis)) for axis in tangents)
-                size = length / (np.maximum(np.hypot(x, y), 1e-300) * end(lengths))
-                stored[:, patch.pairs] = x, y = x * size, y * size
+                stored[:, patch.pairs] = x, y = lengthened(x, y, length / end(lengths))
                 point = end(edge)
                 rows = np.flatnonzero(point >= 0)
                 at_edges.append((rows, edges.terms(point[rows], x[rows], y[rows]) if len(rows) else 0.0))
@@ -193,7 +192,9 @@ class _Moments:
 
     def _sums(self, values: Callable[[Patch], Any], count: int) -> Floats:
         """Return the sums of quantities of pairs at both ends, in the unit, (count, m)."""
-        return self._pairs.over_ends(values, count, self._report) / self._unit
+        sums = self._pairs.over_ends(values, count, self._report)
+        sums /= self._unit
+        return sums
 
     def _basis(self, patch: Patch) -> Floats:
         """Return the terms of the pairs of a patch, (2, 5, pairs), as each end sees them."""
