@@ -186,7 +186,7 @@ def refine(
         image += residual
         del dual, residual
         report()
-        changed = level.rough @ change
+        changed = level.matrix @ change
         own = basis.T @ product(change.T, changed) @ basis
         values, parts = eigh(np.block([[np.diag(values), coupling], [coupling.T, own]]))
         values, parts = values[:count], parts[:, :count]
@@ -271,7 +271,7 @@ def _rest(level: Level, mass: sparse.csr_array | None, load: Array, change: Arra
         np.subtract(load[rows], values, out=values)
         values += weighed[rows] * shifts
 
-    return level.rough.product(change, subtract)
+    return level.matrix.product(change, subtract)
 
 
 def _single(vectors: Floats) -> Array:

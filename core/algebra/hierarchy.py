@@ -16,6 +16,7 @@ from .rows import Rows
 SMALL, LARGE = 300, 900  # unknowns that are solved whole in a hundredth of a second, and in a quarter
 STRONG = (3e-3, 1e-2, 3e-2, 0.1)  # coupling over the diagonal from which unknowns may share an aggregate: about 20
 # by the first one, fewer by the others
+_WEAK = 1e-3  # coupling over the diagonal from which the smoother needs it: half of them, a fiftieth of the energy
 _ROUNDING = 1e-12  # of the largest diagonal entry: smaller ones are rounding error
 _SMOOTHED = 0.3  # relative to the largest eigenvalue: the smoother damps errors of eigenvalues above it
 
@@ -34,9 +35,8 @@ class Known:
 class Level:
     """One version of the matrix."""
 
-    # (n, n), in double and in single precision
-    matrix: Rows
-    rough: Rows
+    matrix: Rows  # (n, n)
+    strong: Rows  # (n, n), the same without weak couplings, in single precision, for the smoother
     mass: sparse.csr_array | None  # (n, n), inner product of its functions; none stands for the identity
     top: float  # largest eigenvalue, about
     steps: list[Array]  # (n, 1) float32 each, step lengths of the Chebyshev smoother, divided by the diagonal
@@ -99,13 +99,15 @@ def build_levels(
         top = rough_largest_eigenvalue(rows, diagonal)
         smooth *= np.maximum(_locally_largest(rows, smooth) / top, 1.0)
         plain = sparse.csr_array((slowest / norm[part], part, np.arange(n + 1, dtype=np.int32)), shape=(n, len(norm)))
-        prolongation = (plain - sparse.diags_array(4.0 / 3.0 / top / diagonal) @ (rows @ plain)).tocsr()
+        strong = _strong(rows, diagonal, slowest)
+        smoothed_plain = Rows(strong, pool, report) @ plain
+        prolongation = (plain - sparse.diags_array(4.0 / 3.0 / top / diagonal) @ smoothed_plain).tocsr()
         restriction = prolongation.T.tocsr()
         back = Rows(restriction, pool, report)
         levels.append(
             Level(
                 matrix=rows,
-                rough=Rows(_single(matrix), pool, report),
+                strong=Rows(_single(strong), pool, report),
                 mass=mass,
                 top=top * highest,
                 steps=[step[:, None].astype(np.float32) for step in smoothing_steps(top, smooth)],
@@ -133,6 +135,27 @@ def _locally_largest(matrix: Rows, diagonal: Floats) -> Floats:
         return 1.0 + np.sqrt(np.maximum(squares - 1.0, 0.0))
 
     return np.concatenate(list(matrix.each(measure)))
+
+
+def _strong(matrix: Rows, diagonal: Floats, slowest: Floats) -> sparse.csr_array:
+    """Return a symmetric matrix without weak couplings; its product with the slowest is the same.
+
+    What hardly couples smooths hardly: errors of high frequency are those of near neighbors.
+    """
+
+    def keep(rows: slice, part: sparse.csr_array) -> tuple[Array, Array, Array]:
+        column, own = part.indices, np.diff(part.indptr)
+        row = np.repeat(np.arange(rows.start, rows.stop, dtype=np.int32), own)
+        itself = row == column
+        kept = itself | (np.abs(part.data) > _WEAK * np.minimum(diagonal[row], diagonal[column]))
+        lost = np.add.reduceat(np.where(kept, 0.0, part.data * slowest[column]), part.indptr[:-1])
+        data = part.data.copy()
+        data[itself] += lost / slowest[rows]
+        return data[kept], column[kept], np.add.reduceat(kept, part.indptr[:-1], dtype=np.int32)
+
+    data, column, count = (np.concatenate(values) for values in zip(*matrix.each(keep), strict=True))
+    start = np.append(np.int32(0), np.cumsum(count, dtype=np.int32))
+    return sparse.csr_array((data, column, start), shape=(len(slowest),) * 2)
 
 
 def _single(matrix: sparse.csr_array) -> sparse.csr_array:
@@ -251,7 +274,7 @@ def _shorten(level: Level) -> None:
     def excess(rows: slice, part: sparse.csr_array) -> float:
         return float(np.max(np.add.reduceat(np.abs(part.data), part.indptr[:-1]) / room[rows]))
 
-    share = np.float32(1.0 / max(1.0, *level.matrix.each(excess)))
+    share = np.float32(1.0 / max(1.0, *level.strong.each(excess)))
     level.steps = [share * step for step in level.steps]
 
 
@@ -265,7 +288,7 @@ def _cycle(levels: list[Level], inverse: Floats, load: Array) -> Array:
     def subtract(rows: slice, values: Array) -> None:
         np.subtract(load[rows], values, out=values)
 
-    rest = level.rough.product(result, subtract)
+    rest = level.strong.product(result, subtract)
     result += level.extension @ _cycle(levels[1:], inverse, level.restriction @ rest)
     return smoothed(level, load, result, level.steps)
 
@@ -279,5 +302,5 @@ def smoothed(level: Level, load: Array, result: Array, steps: list[Array]) -> Ar
             values *= step[rows]
             values += before[rows]
 
-        result = level.rough.product(result, improve)
+        result = level.strong.product(result, improve)
     return result

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from ..cores import cores
-from ..types import Array, Report
+from ..types import Array, Ints, Report
 
 PART = 1 << 20  # entries of a matrix that are multiplied at once, at most: some hundredths of a second
 _LEAST = 1 << 17  # and at least, unless these are all: fewer are multiplied before another thread has started
@@ -32,10 +32,8 @@ class Rows:
         for rows in self._slices:
             pointers = matrix.indptr[rows.start : rows.stop + 1]
             entries = slice(pointers[0], pointers[-1])
-            part = sparse.csr_array((len(pointers) - 1, matrix.shape[1]), dtype=matrix.dtype)
-            # Set afterwards, for the constructor would copy a small slice of an array.
-            part.data, part.indices, part.indptr = matrix.data[entries], matrix.indices[entries], pointers - pointers[0]
-            self._parts.append(part)
+            values = matrix.data[entries], matrix.indices[entries], pointers - pointers[0]
+            self._parts.append(_matrix(*values, matrix.shape[1]))
         self._map: Callable[..., Iterator[Any]] = pool.map if len(self._parts) > 1 else map  # to no other thread
 
     def __matmul__(self, other: Any) -> Any:
@@ -45,10 +43,17 @@ class Rows:
         return self.product(other, lambda rows, values: None)
 
     def product(self, other: Array, change: Callable[[slice, Array], None]) -> Array:
-        """Multiply with an array, (m, k), and change each part of the product, in place, while it is in the cache."""
-        result = np.empty((self._count, other.shape[1]), dtype=np.result_type(self._dtype, other.dtype))
+        """Multiply with an array, (m, k), and change each part of the product, in place, while it is in the cache.
+
+        That with an array of single precision is single: the parts are rounded, which takes less time than the product.
+        """
+        rounded = self._dtype == np.float64 and other.dtype == np.float32
+        dtype = other.dtype if rounded else np.result_type(self._dtype, other.dtype)
+        result = np.empty((self._count, other.shape[1]), dtype=dtype)
 
         def fill(rows: slice, part: sparse.csr_array) -> None:
+            if rounded:
+                part = _matrix(part.data.astype(np.float32), part.indices, part.indptr, part.shape[1])
             values = part @ other
             change(rows, values)
             result[rows] = values
@@ -61,6 +66,13 @@ class Rows:
         for result in self._map(function, self._slices, self._parts):
             self._report()
             yield result
+
+
+def _matrix(values: Array, columns: Ints, start: Ints, width: int) -> sparse.csr_array:
+    """Return a sparse matrix of these arrays themselves: its constructor would copy a small slice of an array."""
+    result = sparse.csr_array((len(start) - 1, width), dtype=values.dtype)
+    result.data, result.indices, result.indptr = values, columns, start
+    return result
 
 
 def part_size(entries: int) -> int:

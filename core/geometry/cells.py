@@ -148,10 +148,10 @@ def _cuts(
         squared[edged], ahead[edged] = bent_ways(distance[edged] ** 2, *heights, turn, sure[edged])
     for step, normal in zip(chord, components(normals, index), strict=True):
         step += side * ahead * normal
-    step = [along(chord, axis) for axis in frame.transpose(2, 1, 0)]
+    x, y = (along(chord, axis) for axis in frame.transpose(2, 1, 0))
     length = 0.5 * np.sqrt(squared) * (1.0 + np.clip(gaussian_curvature[rows, None] * squared / 12.0, -CURVED, CURVED))
     length = np.maximum(length, _CLOSEST * nearest.spacing[rows, None])
-    cuts = np.stack(lengthened(*step, counted / length), axis=2)
+    cuts = np.stack(lengthened(x, y, counted / length), axis=2)
     inside = np.maximum(boundary.distance[rows], _AT_BOUNDARY * nearest.spacing[rows, None])
     outward = np.einsum("iac,ick->iak", boundary.outward[rows], frame) / inside[:, :, None]
     cuts = np.concatenate([cuts, outward], axis=1)

@@ -16,7 +16,6 @@ CURVED = 0.3  # share by which curvature may change a length, an area or a weigh
 _FADING = 0.84  # scatter of fits by fading weights, over that of fits by as many equal ones
 _LOOSE = 15.0  # bend over noise, in units of the neighborhood: up to 7 at edges, 18 and more through two even rows
 _FORM = np.array([1.0, 0.5, 1.0])  # weights of the squares of u^2, u v and v^2: the same whatever way u and v point
-_POWERS = 0, 1, 5, 2, 6, 10  # of 1, u, v, u^2, u v and v^2: a + 5 b of u^a v^b; equal sums are of equal products
 _RIDGE = 1e-10  # keeps the normal equations solvable where the neighbors lie on a conic
 
 
@@ -104,11 +103,12 @@ def fit_quadrics(
         unit = 3.0 * np.sqrt(0.5 * np.trace(spread, axis1=1, axis2=2))  # makes the equations well scaled
         z, v, u = (along(offset, axis.T / unit) for axis in np.moveaxis(frame, 2, 0))
         basis = np.ones_like(u), u, v, u * u, u * v, v * v
-        equations, known = np.empty((6, 7, len(u))), {}
+        powers = 0, 1, 5, 2, 6, 10  # a + 5 b of u^a v^b: where their sums are equal, so are the products
+        equations, known = np.empty((6, 7, len(u))), dict[int, Floats]()
         for row, weighted in enumerate(share * values for values in basis):
             equations[row, 6] = _sums(weighted, z)
             for column in range(row + 1):
-                power = _POWERS[row] + _POWERS[column]
+                power = powers[row] + powers[column]
                 known[power] = known[power] if power in known else _sums(weighted, basis[column])
                 equations[row, column] = equations[column, row] = known[power]
         equations[range(6), range(6)] += _RIDGE
@@ -237,8 +237,8 @@ def along(chord: Floats, directions: Floats) -> Floats:
 
 
 def lengthened(x: Floats, y: Floats, length: Floats) -> tuple[Floats, Floats]:
-    """Return steps in a plane with other lengths, by their squares: hypot, for the smallest, takes six times as long."""
-    size = length / np.maximum(np.sqrt(x * x + y * y), 1e-300)
+    """Return steps in a plane, of any shape, with other lengths."""
+    size = length / np.maximum(np.sqrt(x * x + y * y), 1e-300)  # hypot, right for the smallest too, takes much longer
     return x * size, y * size
 
 
