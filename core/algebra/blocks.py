@@ -21,8 +21,17 @@ _limits: list[Any] = []  # of the threads of BLAS: the same one for each pool th
 
 
 def blocks(count: int, size: int) -> list[slice]:
-    """Return the slices that divide a number of rows into blocks of one size."""
-    return [slice(start, min(start + size, count)) for start in range(0, count, size)]
+    """Return slices that divide a number of rows into blocks of at most a size: 1, 2, 4, or a multiple of 8 of them.
+
+    So many are shared evenly by as many cores as machines have.
+    """
+    least = -(-count // size)
+    return shares(count, min(1 << max(least - 1, 0).bit_length(), -(-least // 8) * 8))
+
+
+def shares(count: int, parts: int) -> list[slice]:
+    """Return slices that divide a number of rows evenly into so many parts."""
+    return [slice(count * part // parts, count * (part + 1) // parts) for part in range(parts)]
 
 
 @contextmanager

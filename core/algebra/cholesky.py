@@ -9,7 +9,7 @@ from scipy.linalg.lapack import dpotrf, dtrtri
 
 from ..errors import SolverError
 from ..types import Floats, Ints
-from .blocks import blocks
+from .blocks import shares
 from .dense import multiply
 
 _BANDS = 6  # of columns by which a lower triangle is added: less work than the whole square
@@ -116,7 +116,7 @@ def _add(front: Floats, place: Ints, left: Floats) -> None:
     if place[-1] - place[0] == len(place) - 1:
         front[place[0] : place[-1] + 1, place[0] : place[-1] + 1] += left
         return
-    for columns in blocks(len(place), -(-len(place) // _BANDS)):
+    for columns in shares(len(place), min(len(place), _BANDS)):
         rows = slice(columns.start, None)
         front.T[place[columns, None], place[rows]] += left.T[columns, rows]  # along memory
 

@@ -8,7 +8,7 @@ from scipy import sparse
 from scipy.linalg import eigh
 
 from ..types import Array, Floats, Ints
-from .blocks import blocks, on_all_cores, workers
+from .blocks import blocks, on_all_cores, shares, workers
 from .chebyshev import chebyshev_steps
 from .dense import multiply, product, subtract_product
 from .hierarchy import LARGE, SMALL, Known, Level, build_levels, smoothed, solve_roughly
@@ -220,7 +220,7 @@ def _corrections(
     weighed = found if level.mass is None else _single(dual)
     result = np.zeros((len(found), len(active)), dtype=np.float32)
     turns = -(-len(active) // max(_COLUMNS, _ENTRIES // len(found)))
-    for part in blocks(len(active), -(-len(active) // turns)):
+    for part in shares(len(active), turns):
         load, shifts = np.take(residual, active[part], axis=1), values[active[part]].astype(np.float32)
         load /= _lengths(load)
         relative = shifts / np.float32(values[size - 1])

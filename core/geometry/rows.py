@@ -11,7 +11,7 @@ from .nearest import NEXT, ROW, SMOOTH, Nearest, fading_weights
 from .quadrics import fit_quadrics
 
 _WIDER = 16  # times the 40 neighbors are looked at: the next row may be a hundred times as far as the next point
-_BLOCK = 1 << 11  # points looked at at one time
+_BLOCK = 1 << 8  # points looked at at one time
 
 
 def look_across_rows(nearest: Nearest) -> Nearest:

@@ -16,6 +16,13 @@ def test_blocks_cover_all_rows_once(count, size):
     assert all(len(part) <= size for part in rows)
 
 
+def test_cores_share_blocks_evenly():
+    for count, many in (8, 1), (9, 2), (17, 4), (33, 8), (65, 16):
+        sizes = [block.stop - block.start for block in blocks(count, 8)]
+        assert len(sizes) == many
+        assert max(sizes) - min(sizes) <= 1
+
+
 @pytest.mark.parametrize("parts", [[], [3], list(range(20))])
 def test_results_come_in_the_order_of_the_parts(parts):
     assert on_all_cores(lambda part: part**2, parts) == [part**2 for part in parts]
