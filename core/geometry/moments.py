@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import functools
-from itertools import pairwise
 
 import numpy as np
 
-from ..algebra import blocks, eliminate, on_all_cores
+from ..algebra import blocks, eliminate, on_all_cores, shares
 from ..kernel import SUPPORT, pair_kernel
 from ..types import Floats, Ints
 from .boundary import Boundary
@@ -16,7 +15,7 @@ from .quadrics import along, chords, frames, gathered, lengthened
 from .sheets import on_sheet
 
 TERMS = 5  # of a point: trace of the second moment, first moment (2), the rest of the second (2)
-_MORE = 64, 160  # neighbors looked at where the kernel holds more than 40; beyond, any sampling is dense enough
+_MOST = 160  # neighbors in a kernel, at most, that are looked at: with more, any sampling is dense enough
 LARGEST = 2.0  # change of a weight's logarithm, at most: where more is needed the moments cannot be met
 _STEPS = 8  # of Newton's method
 MET = 2e-3  # relative residual of the moments that is small enough; the ridge of their equations, too
@@ -83,12 +82,13 @@ def least_error(
         open_ = np.flatnonzero((nearest.distance[block, -1] <= SUPPORT * lengths[block]) & (found > MET))
         places, reach = nearest.points[block[open_]], SUPPORT * lengths[block[open_]]
         count = nearest.tree.query_ball_point(places, reach, return_length=True)
-        found[open_[count > _MORE[-1]]] = 0.0
-        for fewer, most in pairwise((0, *_MORE)):
-            asked = open_[(fewer < count) & (count <= most)]
-            if len(asked):
+        found[open_[count > _MOST]] = 0.0
+        order = np.argsort(count, kind="stable")[: np.count_nonzero(count <= _MOST)]
+        for some in shares(len(order), 2):  # half of them have few, and are not queried for many
+            if some.stop > some.start:
+                asked, most = open_[order[some]], count[order[some.stop - 1]]
                 here = block[asked]
-                distance, index = nearest.tree.query(nearest.points[here], k=range(2, min(most, len(normals)) + 1))
+                distance, index = nearest.tree.query(nearest.points[here], k=range(2, most + 1))
                 found[asked] = solve(here, distance, index)
 
     def solve(rows: Ints, distance: Floats, index: Ints) -> Floats:
