@@ -246,13 +246,15 @@ def test_it_can_be_stopped_at_any_time(operators, coarse):
             solve_symmetric(matrix, load, progress=stop)
 
 
-def test_a_product_is_changed_part_by_part(monkeypatch):
+@pytest.mark.parametrize("columns", [0, 1, 3, 6])
+@pytest.mark.parametrize(("dtype", "tolerance"), [(np.float64, 1e-14), (np.float32, 1e-6)])
+def test_a_product_is_changed_part_by_part_in_the_precision_of_its_columns(monkeypatch, columns, dtype, tolerance):
     monkeypatch.setattr("core.algebra.rows.PART", 50)
     rng = np.random.default_rng(0)
     matrix, other, load = (
         sparse.random_array((60, 40), density=0.2, rng=rng).tocsr(),
-        rng.random((40, 3)),
-        rng.random((60, 3)),
+        rng.random((40, columns)).astype(dtype),
+        rng.random((60, columns)).astype(dtype),
     )
 
     def subtract(rows, values):
@@ -260,7 +262,23 @@ def test_a_product_is_changed_part_by_part(monkeypatch):
 
     with ThreadPoolExecutor(2) as pool:
         found = Rows(matrix, pool, silent).product(other, subtract)
-    np.testing.assert_allclose(found, load - matrix @ other, atol=1e-14)
+    assert found.dtype == dtype
+    np.testing.assert_allclose(found, load - matrix @ other, rtol=0.0, atol=tolerance)
+
+
+@pytest.mark.parametrize("name", CLOUDS)
+def test_a_matrix_without_weak_couplings_is_about_the_same(operators, name):
+    """It is symmetric, takes the slowest function to the same, and has nearly the energy of smooth ones."""
+    laplacian = operators(name)
+    root = np.sqrt(laplacian.areas)
+    matrix = (sparse.diags_array(1.0 / root) @ laplacian.stiffness @ sparse.diags_array(1.0 / root)).tocsr()
+    with ThreadPoolExecutor(2) as pool:
+        strong = hierarchy._strong(Rows(matrix, pool, silent), matrix.diagonal(), root)
+    assert strong.nnz < 0.8 * matrix.nnz
+    assert abs(strong - strong.T).max() <= 1e-12 * abs(matrix).max()
+    np.testing.assert_allclose(strong @ root, matrix @ root, rtol=0.0, atol=1e-12 * abs(matrix).max())
+    smooth = root * np.sin(3.0 * laplacian.points[:, 0])
+    assert 0.9 < (smooth @ strong @ smooth) / (smooth @ matrix @ smooth) < 1.01
 
 
 def attached(extra, links):
