@@ -16,7 +16,7 @@ from .rows import Rows
 SMALL, LARGE = 300, 900  # unknowns that are solved whole in a hundredth of a second, and in a quarter
 STRONG = (3e-3, 1e-2, 3e-2, 0.1)  # coupling over the diagonal from which unknowns may share an aggregate: about 20
 # by the first one, fewer by the others
-_WEAK = 1e-3  # coupling over the diagonal from which the smoother needs it: half of them, a fiftieth of the energy
+_WEAK = 1e-3  # coupling over the diagonal up to which the smoother leaves it out: two fifths of all, of little energy
 _ROUNDING = 1e-12  # of the largest diagonal entry: smaller ones are rounding error
 _SMOOTHED = 0.3  # relative to the largest eigenvalue: the smoother damps errors of eigenvalues above it
 
@@ -100,8 +100,8 @@ def build_levels(
         smooth *= np.maximum(_locally_largest(rows, smooth) / top, 1.0)
         plain = sparse.csr_array((slowest / norm[part], part, np.arange(n + 1, dtype=np.int32)), shape=(n, len(norm)))
         strong = _strong(rows, diagonal, slowest)
-        smoothed_plain = Rows(strong, pool, report) @ plain
-        prolongation = (plain - sparse.diags_array(4.0 / 3.0 / top / diagonal) @ smoothed_plain).tocsr()
+        image = Rows(strong, pool, report) @ plain
+        prolongation = (plain - sparse.diags_array(4.0 / 3.0 / top / diagonal) @ image).tocsr()
         restriction = prolongation.T.tocsr()
         back = Rows(restriction, pool, report)
         levels.append(
@@ -144,9 +144,8 @@ def _strong(matrix: Rows, diagonal: Floats, slowest: Floats) -> sparse.csr_array
     """
 
     def keep(rows: slice, part: sparse.csr_array) -> tuple[Array, Array, Array]:
-        column, own = part.indices, np.diff(part.indptr)
-        row = np.repeat(np.arange(rows.start, rows.stop, dtype=np.int32), own)
-        itself = row == column
+        row = np.repeat(np.arange(rows.start, rows.stop, dtype=np.int32), np.diff(part.indptr))
+        column, itself = part.indices, row == part.indices
         kept = itself | (np.abs(part.data) > _WEAK * np.minimum(diagonal[row], diagonal[column]))
         lost = np.add.reduceat(np.where(kept, 0.0, part.data * slowest[column]), part.indptr[:-1])
         data = part.data.copy()
@@ -154,8 +153,7 @@ def _strong(matrix: Rows, diagonal: Floats, slowest: Floats) -> sparse.csr_array
         return data[kept], column[kept], np.add.reduceat(kept, part.indptr[:-1], dtype=np.int32)
 
     data, column, count = (np.concatenate(values) for values in zip(*matrix.each(keep), strict=True))
-    start = np.append(np.int32(0), np.cumsum(count, dtype=np.int32))
-    return sparse.csr_array((data, column, start), shape=(len(slowest),) * 2)
+    return sparse.csr_array((data, column, np.append(0, np.cumsum(count))), shape=(len(slowest),) * 2)
 
 
 def _single(matrix: sparse.csr_array) -> sparse.csr_array:

@@ -12,8 +12,8 @@ from ..cores import cores
 from ..types import Array, Ints, Report
 
 PART = 1 << 20  # entries of a matrix that are multiplied at once, at most: some hundredths of a second
-_FEW = 4  # columns, up to which products with one at a time are faster, by half
 _LEAST = 1 << 17  # and at least, unless these are all: fewer are multiplied before another thread has started
+_FEW = 4  # columns, up to which products with one at a time are faster, by half
 
 Result = TypeVar("Result")
 
