@@ -89,19 +89,19 @@ def build_levels(
         # with no other; the smoother takes these, too, but does not divide by less than `low`.
         smooth = np.where(diagonal > _ROUNDING * highest, np.maximum(diagonal, low * own), np.inf)
         diagonal[diagonal <= np.maximum(_ROUNDING * highest, low * own)] = np.inf
+        strong = _strong(rows, diagonal, slowest)
+        few = Rows(strong, pool, report)
         for share in STRONG:
-            part = aggregates(rows, diagonal, share, report)[0]
+            part = aggregates(few, diagonal, share, report)[0]
             if part.max() >= enough:
                 break
         norm = np.sqrt(np.bincount(part, slowest**2))
         if 2 * len(norm) > n:
             break
-        top = rough_largest_eigenvalue(rows, diagonal)
+        top = rough_largest_eigenvalue(few, diagonal)
         smooth *= np.maximum(_locally_largest(rows, smooth) / top, 1.0)
         plain = sparse.csr_array((slowest / norm[part], part, np.arange(n + 1, dtype=np.int32)), shape=(n, len(norm)))
-        strong = _strong(rows, diagonal, slowest)
-        image = Rows(strong, pool, report) @ plain
-        prolongation = (plain - sparse.diags_array(4.0 / 3.0 / top / diagonal) @ image).tocsr()
+        prolongation = (plain - sparse.diags_array(4.0 / 3.0 / top / diagonal) @ (few @ plain)).tocsr()
         restriction = prolongation.T.tocsr()
         back = Rows(restriction, pool, report)
         levels.append(
@@ -177,13 +177,16 @@ def aggregates(matrix: Rows, diagonal: Floats, share: float, report: Report) -> 
     row, column, weight = (np.concatenate(values) for values in zip(*matrix.each(strong), strict=True))
     n = len(diagonal)
     first = np.searchsorted(row, np.arange(n, dtype=np.int32))
-    rank = np.random.default_rng(0).permutation(n).astype(np.int32)
-    waiting, root = rank.copy(), np.zeros(n, dtype=bool)
-    while waiting.max() >= 0:  # a root comes first around it in a random order, round by round (Luby 1986)
+    rank, root = np.random.default_rng(0).permutation(n).astype(np.int32), np.zeros(n, dtype=bool)
+    waiting, couples, start = np.arange(n), column, first
+    while len(waiting):  # a root comes first around it in a random order, round by round (Luby 1986)
         report()
-        new = (waiting >= 0) & (waiting == np.maximum.reduceat(waiting[column], first))
-        root |= new
-        waiting[np.maximum.reduceat(new[column], first)] = -1
+        root[waiting] = rank[waiting] == np.maximum.reduceat(rank[couples], start)
+        done = np.maximum.reduceat(root[couples], start)
+        rank[waiting[done]] = -1
+        left = np.repeat(~done, np.diff(start, append=len(couples)))
+        many = np.diff(start, append=len(couples))[~done]
+        waiting, couples, start = waiting[~done], couples[left], np.cumsum(many) - many
     weight = np.where(root[column], weight, 0.0)
     best = np.flatnonzero(weight == np.maximum.reduceat(weight, first)[row])
     chosen = np.empty(n, dtype=np.int32)
