@@ -216,10 +216,8 @@ def _corrections(
 
     They are computed for some of them at a time, as a V-cycle takes several times their memory.
     """
-    level, found = levels[0], _single(vectors)
-    weighed = found if level.mass is None else _single(dual)
-    result = np.zeros((len(found), len(active)), dtype=np.float32)
-    turns = -(-len(active) // max(_COLUMNS, _ENTRIES // len(found)))
+    level, result = levels[0], np.zeros((len(vectors), len(active)), dtype=np.float32)
+    turns = -(-len(active) // max(_COLUMNS, _ENTRIES // len(vectors)))
     for part in shares(len(active), turns):
         load, shifts = np.take(residual, active[part], axis=1), values[active[part]].astype(np.float32)
         load /= _lengths(load)
@@ -227,7 +225,7 @@ def _corrections(
         rates, change = chebyshev_steps(*_CYCLED), np.zeros_like(load)
         for left in reversed(range(cycles)):
             cycle = solve_roughly(levels, coarsest, load, relative, size)
-            subtract_product(cycle, found, product(weighed.T, cycle))
+            subtract_product(cycle, vectors, product(dual.T, cycle))
             kept, rate = next(rates)
             change *= kept
             cycle *= rate
@@ -272,13 +270,6 @@ def _rest(level: Level, mass: sparse.csr_array | None, load: Array, change: Arra
         values += weighed[rows] * shifts
 
     return level.matrix.product(change, subtract)
-
-
-def _single(vectors: Floats) -> Array:
-    """Return vectors in single precision."""
-    result = np.empty(vectors.shape, dtype=np.float32)
-    on_all_cores(lambda rows: np.copyto(result[rows], vectors[rows], "same_kind"), blocks(len(vectors), _BLOCK))
-    return result
 
 
 def _lengths(vectors: Array) -> Array:

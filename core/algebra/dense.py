@@ -14,20 +14,20 @@ _BLOCK = 1 << 13  # small matrices
 
 
 def product(left: Array, right: Array) -> Array:
-    """Return ``left @ right`` of two matrices, (m, k) and (k, n), one of which is long, of one precision, on all cores.
+    """Return ``left @ right`` of two matrices, (m, k) and (k, n), one of which is long, on all cores.
 
-    Fast if one axis of each is contiguous; others are copied.
+    The result has the lower precision of the two. Fast if one axis of each is contiguous; others are copied.
     """
-    (m, k), n = left.shape, right.shape[1]
+    (m, k), n, dtype = left.shape, right.shape[1], _lower(left, right)
     size = max(1, _WORK // max(1, min(m, k) * n))
     if max(m, k) <= size:
         return multiply(left, right)
     if m >= k:
-        result = np.empty((m, n), dtype=left.dtype)
+        result = np.empty((m, n), dtype=dtype)
         on_all_cores(lambda rows: np.copyto(result[rows], multiply(left[rows], right)), blocks(m, size))
         return result
     sums = on_all_cores(lambda part: multiply(left[:, part], right[part]), blocks(k, size))
-    return sum(sums, np.zeros((m, n), dtype=left.dtype))
+    return sum(sums, np.zeros((m, n), dtype=dtype))
 
 
 def subtract_product(result: Array, left: Array, right: Array) -> None:
@@ -40,29 +40,36 @@ def subtract_product(result: Array, left: Array, right: Array) -> None:
 
 
 def multiply(left: Array, right: Array) -> Array:
-    """Return ``left @ right`` of two matrices, (m, k) and (k, n), of one precision, by one call of BLAS.
+    """Return ``left @ right`` of two matrices, (m, k) and (k, n), by one call of BLAS.
 
-    BLAS takes columns, and numpy has rows: it computes the transpose, as the product of the transposes.
+    The result has the lower precision of the two. BLAS takes columns, and numpy has rows: it computes the transpose, as the product of the transposes.
     """
-    (m, k), (rows, n), (gemm, number) = left.shape, right.shape, _GEMM[left.dtype.char]
+    (m, k), (rows, n), dtype = left.shape, right.shape, _lower(left, right)
     if rows != k:  # BLAS would read what is beyond
         raise ValueError(f"Matrices of the shapes {left.shape} and {right.shape} have no product.")
-    result = np.zeros((m, n), dtype=left.dtype)
+    result, (gemm, number) = np.zeros((m, n), dtype=dtype), _GEMM[dtype.char]
     if m * k * n:
-        (right, flip_a, step_a), (left, flip_b, step_b) = (_in_columns(part, left.dtype) for part in (right, left))
+        (right, flip_a, step_a), (left, flip_b, step_b) = (
+            _in_columns(part.astype(dtype, copy=False)) for part in (right, left)
+        )
         sizes, (one, none) = [byref(c_int64(size)) for size in (n, m, k)], (byref(number(x)) for x in (1.0, 0.0))
         a, b, c = (array.ctypes.data for array in (right, left, result))
         gemm(flip_a, flip_b, *sizes, one, a, step_a, b, step_b, none, c, sizes[0])
     return result
 
 
-def _in_columns(matrix: Array, dtype: Any) -> tuple[Array, bytes, Any]:
+def _lower(left: Array, right: Array) -> Any:
+    """Return the type of numbers that has the lower precision."""
+    return min(left.dtype, right.dtype, key=lambda dtype: dtype.itemsize)
+
+
+def _in_columns(matrix: Array) -> tuple[Array, bytes, Any]:
     """Return a matrix, whether BLAS is to transpose it, and the step from one of its columns to the next."""
     (rows, columns), size, steps = matrix.shape, matrix.itemsize, matrix.strides
-    if matrix.dtype == dtype and steps[0] == size and steps[1] >= size * rows:
+    if steps[0] == size and steps[1] >= size * rows:
         return matrix, b"T", byref(c_int64(steps[1] // size))
-    if not (matrix.dtype == dtype and steps[1] == size and steps[0] >= size * columns):
-        matrix = np.array(matrix, dtype=dtype, order="C")
+    if not (steps[1] == size and steps[0] >= size * columns):
+        matrix = np.array(matrix, order="C")
     return matrix, b"N", byref(c_int64(matrix.strides[0] // matrix.itemsize))
 
 

@@ -48,12 +48,16 @@ def test_product_of_parts_of_matrices(change):
     np.testing.assert_allclose(dense.product(right.T, left.T), right.T @ left.T, rtol=0, atol=atol)
 
 
-def test_product_of_two_precisions_has_that_of_the_first():
-    left, right = np.random.default_rng(0).standard_normal((2, 6, 6))
-    np.testing.assert_allclose(dense.product(left, right.astype(np.float32)), left @ right.astype(np.float32))
-    single = dense.product(left.astype(np.float32), right)
-    assert single.dtype == np.float32
-    np.testing.assert_allclose(single, left @ right, rtol=0, atol=1e-5)
+@pytest.mark.parametrize("work", [1, 1000, 1 << 24])
+@pytest.mark.parametrize("shape", [(90, 4, 7), (4, 90, 7), (4, 7, 90), (6, 6, 6)])
+def test_product_of_two_precisions_has_the_lower_one(monkeypatch, work, shape):
+    monkeypatch.setattr(dense, "_WORK", work)
+    (m, k, n), rng = shape, np.random.default_rng(0)
+    left, right = rng.standard_normal((m, k)), rng.standard_normal((k, n))
+    for pair in ((left, right.astype(np.float32)), (left.astype(np.float32), right)):
+        result = dense.product(*pair)
+        assert result.dtype == np.float32
+        np.testing.assert_allclose(result, left @ right, rtol=0, atol=1e-4)
 
 
 def test_matrices_that_do_not_fit_have_no_product():
