@@ -42,7 +42,8 @@ def subtract_product(result: Array, left: Array, right: Array) -> None:
 def multiply(left: Array, right: Array) -> Array:
     """Return ``left @ right`` of two matrices, (m, k) and (k, n), by one call of BLAS.
 
-    The result has the lower precision of the two. BLAS takes columns, and numpy has rows: it computes the transpose, as the product of the transposes.
+    The result has the lower precision of the two. BLAS takes columns, and numpy has rows: it computes the transpose, as
+    the product of the transposes.
     """
     (m, k), (rows, n), dtype = left.shape, right.shape, _lower(left, right)
     if rows != k:  # BLAS would read what is beyond
