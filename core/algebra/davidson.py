@@ -78,7 +78,7 @@ def coarse_to_fine(
             for _ in range(_FILTERED):
                 guards = solve_roughly(levels[number:], coarsest, guards, np.zeros(guards.shape[1], np.float32), size)
                 guards /= _lengths(guards)
-            vectors = np.column_stack([vectors, guards]).astype(np.float64)
+            vectors = np.concatenate([vectors, guards], axis=1, dtype=np.float64)
             wanted, goal, limit = (count, tolerance, _STEPS) if finest else (size, _COARSE, _COARSE_STEPS)
             values, vectors, right = refine(
                 levels[number:], coarsest, vectors, size, wanted, goal, scale, limit, report, finest
@@ -182,8 +182,7 @@ def refine(
         kept = lengths > 1e-5 * lengths[-1]  # the others are rounding error
         basis = basis[:, kept] / np.sqrt(lengths[kept])
         coupling = product(residual.T, change) @ basis
-        image = dual * values
-        image += residual
+        image = _image(dual, values, residual)
         del dual, residual
         report()
         changed = level.matrix @ change
@@ -259,6 +258,18 @@ def _residual(image: Floats, dual: Floats, values: Floats) -> tuple[Array, Float
 
     squares = sum(on_all_cores(subtract, blocks(len(image), _BLOCK)), np.zeros(len(values)))
     return result, np.sqrt(np.maximum(squares, np.finfo(np.float32).tiny))
+
+
+def _image(dual: Floats, values: Floats, residual: Array) -> Floats:
+    """Return ``dual * values + residual``."""
+    result = np.empty(dual.shape)
+
+    def restore(rows: slice) -> None:
+        np.multiply(dual[rows], values, out=result[rows])
+        result[rows] += residual[rows]
+
+    on_all_cores(restore, blocks(len(dual), _BLOCK))
+    return result
 
 
 def _rest(level: Level, mass: sparse.csr_array | None, load: Array, change: Array, shifts: Array) -> Array:

@@ -10,6 +10,7 @@ from scipy import sparse
 
 from ..cores import cores
 from ..types import Array, Ints, Report
+from .blocks import blocks
 
 PART = 1 << 20  # entries of a matrix that are multiplied at once, at most: some hundredths of a second
 _LEAST = 1 << 17  # and at least, unless these are all: fewer are multiplied before another thread has started
@@ -26,8 +27,8 @@ class Rows:
 
     def __init__(self, matrix: sparse.csr_array, pool: ThreadPoolExecutor, report: Report) -> None:
         self._report, self._count, self._dtype = report, matrix.shape[0], matrix.dtype
-        starts = np.append(np.arange(0, max(matrix.nnz, 1), part_size(matrix.nnz)), matrix.nnz)
-        cuts = np.unique(np.append(np.searchsorted(matrix.indptr[:-1], starts[:-1]), matrix.shape[0]))
+        starts = [part.start for part in blocks(max(matrix.nnz, 1), part_size(matrix.nnz))]
+        cuts = np.unique(np.append(np.searchsorted(matrix.indptr[:-1], starts), matrix.shape[0]))
         self._slices = [slice(first, last) for first, last in pairwise(cuts)]
         self._parts = []
         for rows in self._slices:

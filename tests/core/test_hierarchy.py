@@ -12,7 +12,7 @@ import core
 from benchmarks.samplings import random_sphere
 from core.algebra import coarse_to_fine, davidson, hierarchy, solvers
 from core.algebra.hierarchy import approximate_inverse
-from core.algebra.rows import Rows
+from core.algebra.rows import PART, Rows
 from core.algebra.solvers import conjugate_gradients, solve_symmetric
 
 PAIRS = [(k, j) for k in range(2) for j in range(3)]
@@ -153,6 +153,15 @@ def test_parts_that_become_one_unknown_each(thread):
         found = conjugate_gradients(matrix, load, scaling=approximate_inverse(matrix, pool, silent))
     assert found.converged
     assert found.products < 20
+
+
+def test_cores_share_entries_of_a_matrix_evenly():
+    """Such as 3.2 times as many as are multiplied at once: by four, and not three and a rest."""
+    matrix = sparse.eye_array(16 * PART // 5, format="csr")
+    with ThreadPoolExecutor() as pool:
+        counts = list(Rows(matrix, pool, silent).each(lambda rows, part: part.nnz))
+    assert sum(counts) == matrix.nnz
+    assert max(counts) <= min(counts) + 1
 
 
 def test_components_that_cancel_exactly():
