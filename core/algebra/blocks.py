@@ -35,22 +35,27 @@ def shares(count: int, parts: int) -> list[slice]:
 
 
 @contextmanager
-def workers(most: int | None = None) -> Iterator[ThreadPoolExecutor]:
-    """Open a pool of a thread for each core, or of fewer, while BLAS starts none.
+def one_blas_thread() -> Iterator[None]:
+    """Let BLAS start no threads of its own: after each call they are awake for some hundredths of a second.
 
-    After each of its calls BLAS's own threads are awake for some hundredths of a second, and keep their cores from
-    these. They are limited for the whole process, until the last of all pools is closed.
+    Meanwhile they keep cores from ours. They are limited for the whole process, until the last such context ends.
     """
     with _LOCK:
         _limits.append(_limits[0] if _limits else _from_any_thread(_one_thread))
     try:
-        with ThreadPoolExecutor(min(cores(), most or cores())) as pool:
-            yield pool
+        yield
     finally:
         with _LOCK:
             limit = _limits.pop()
             if not _limits:
                 _from_any_thread(limit.restore_original_limits)
+
+
+@contextmanager
+def workers(most: int | None = None) -> Iterator[ThreadPoolExecutor]:
+    """Open a pool of a thread for each core, or of fewer, while BLAS has one."""
+    with one_blas_thread(), ThreadPoolExecutor(min(cores(), most or cores())) as pool:
+        yield pool
 
 
 def _one_thread() -> Any:

@@ -77,6 +77,14 @@ def test_blas_has_no_threads_while_ours_work(three):
     assert threads_of_blas() == {3}
 
 
+def test_blas_has_no_threads_from_the_start_to_the_end_of_a_build(three):
+    seen = []
+    core.build_laplacian(fibonacci_sphere(2000), progress=lambda *_: seen.append(threads_of_blas()))
+    assert len(seen) > 9
+    assert all(threads == {1} for threads in seen[:-1])
+    assert seen[-1] == {3}  # told after it that all is done
+
+
 def test_blas_has_its_threads_again_after_an_error(three):
     with pytest.raises(core.Cancelled), workers():
         raise core.Cancelled
