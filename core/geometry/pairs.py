@@ -1,7 +1,7 @@
 """The neighbor pairs inside the kernel's support."""
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Self, TypeAlias
 
@@ -14,7 +14,7 @@ from ..kernel import SUPPORT
 from ..types import Array, Bools, Floats, Ints, Report
 from .patches import Patch, divide_pairs
 
-Ends: TypeAlias = Sequence[Sequence[Floats]] | Floats  # quantities of pairs at their first and second points
+Ends: TypeAlias = Sequence[Iterable[Floats]] | Floats  # quantities of pairs at their first and second points
 
 _ROWS = 1 << 12  # points whose pairs are searched for at one time, at most
 _CANDIDATES = 1 << 20  # neighbors that a core looks at at one time meanwhile, about
@@ -54,7 +54,7 @@ class Pairs:
 
         def sums(patch: Patch) -> tuple[Floats, Floats]:
             first, second = values(patch)
-            return patch.over_first(*first), patch.over_second(*second)
+            return patch.over_first(first), patch.over_second(second)
 
         total, found = np.zeros((count, len(self.points))), on_all_cores(sums, self.patches, report)
 

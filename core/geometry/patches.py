@@ -1,5 +1,6 @@
 """Pairs by blocks that fit the cache: gather from the points at their ends, and scatter to these."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -34,18 +35,18 @@ class Patch:
         """Return the mean of a point quantity over both ends of each pair."""
         return 0.5 * (self.first(values) + self.second(values))
 
-    def over_first(self, *values: Floats) -> Floats:
+    def over_first(self, values: Iterable[Floats]) -> Floats:
         """Return the sums of quantities of pairs, (pairs,) each, over the pairs of each first point, (q, k)."""
         return np.stack([np.add.reduceat(row, self.ends.indptr[:-1]) for row in values])
 
-    def over_second(self, *values: Floats) -> Floats:
+    def over_second(self, values: Iterable[Floats]) -> Floats:
         """Return the sums of quantities of pairs, (pairs,) each, over the pairs of each second point, (q, l)."""
-        result, ones, none = np.empty((len(values), len(self.columns))), np.ones(len(self.rows)), self.ends.data
-        for row, total in zip(values, result, strict=True):
+        ones, none, sums = np.ones(len(self.rows)), self.ends.data, []
+        for row in values:
             self.ends.data = row
-            total[:] = self.ends @ ones
+            sums.append(self.ends @ ones)
         self.ends.data = none
-        return result
+        return np.stack(sums)
 
 
 def _taken(values: Array, places: Ints) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -171,11 +171,15 @@ class _Moments:
         """Return the moments, and the inverse Hessian of the entropy by the coefficients of each point, (5, 5, m)."""
         places = [(i, j) for i in range(TERMS) for j in range(i + 1)]
 
-        def products(patch: Patch) -> list[list[Floats]]:
+        def products(patch: Patch) -> list[Iterator[Floats]]:
             basis = self._basis(patch)
             weighted = self._weigh(patch, basis, terms) * basis
-            ends = zip(weighted, basis, strict=True)
-            return [[*own, *(own[i] * other[j] for i, j in places)] for own, other in ends]
+            return [summed(*end) for end in zip(weighted, basis, strict=True)]
+
+        def summed(own: Floats, other: Floats) -> Iterator[Floats]:
+            yield from own
+            for i, j in places:
+                yield own[i] * other[j]
 
         left, right = np.transpose(places)
         sums = self._sums(products, TERMS + len(places))

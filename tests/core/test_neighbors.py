@@ -61,8 +61,8 @@ def test_patches_hold_each_pair_once_and_sum_at_both_ends(monkeypatch):
         assert np.array_equal(patch.first(values), values[:, first[patch.pairs]])
         assert np.array_equal(patch.second(values), values[:, second[patch.pairs]])
         assert np.allclose(patch.mean(values[0]), pairs.mean(values[0])[patch.pairs], rtol=1e-15)
-        sums[0][:, patch.rows] += patch.over_first(*weights[:, patch.pairs])
-        sums[1][:, patch.columns] += patch.over_second(*weights[:, patch.pairs])
+        sums[0][:, patch.rows] += patch.over_first(weights[:, patch.pairs])
+        sums[1][:, patch.columns] += patch.over_second(weights[:, patch.pairs])
     for total, end in zip(exact, (first, second), strict=True):
         np.add.at(total.T, end, weights.T)
     assert np.allclose(sums, exact, rtol=1e-13)
