@@ -115,7 +115,6 @@ def build_levels(
                 restriction=Rows(_single(restriction), pool, report),
             )
         )
-        del few, strong  # large
         matrix = back @ (rows @ prolongation)
         matrix.setdiag(matrix.diagonal())  # stored also where a component cancels: products leave out what is zero
         mass = back @ (prolongation if mass is None else mass @ prolongation)
