@@ -87,9 +87,11 @@ def lift_lowest(
         def remainder(y: Floats, found: Floats = vectors) -> Floats:
             return project(found, polynomial(project(found, y.ravel())))
 
-        if solve(remainder, k=1, tol=1e-3, return_eigenvectors=False)[0] <= lifted.min() * (1.0 + 1e-6):
+        if solve(remainder, k=1, tol=1e-3, return_eigenvectors=False)[0] <= lifted.min() * (1.0 - 1e-2):
             break
         missed, vector = solve(remainder, k=1, tol=1e-13)
+        if missed[0] <= lifted.min() * (1.0 + 1e-9):
+            break
         best = np.argsort(-np.append(lifted, missed))[:count]
         lifted, vectors = np.append(lifted, missed)[best], np.column_stack([vectors, vector])[:, best]
     values = np.einsum("ij,ij->j", vectors, matrix @ vectors)

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy import sparse
 
 import core
 from benchmarks.samplings import (
@@ -10,6 +11,7 @@ from benchmarks.samplings import (
     random_sphere,
     sphere_eigenvalues,
 )
+from core.algebra import lift_lowest
 
 
 @pytest.fixture(scope="module")
@@ -220,6 +222,17 @@ def test_no_copy_is_lost(cloud, count, coarse, monkeypatch):
     np.testing.assert_allclose(spectrum.eigenvalues, exact[:count], rtol=1e-8, atol=1e-9)
     assert spectrum.residuals.shape == (count,)
     assert spectrum.residuals.max() < 2e-7
+
+
+def test_no_copy_is_lost_from_any_start():
+    near = 6.0 * (1.0 + 1e-5 * np.arange(5))  # with a copy of each, and only the first and its copy are asked for
+    exact = np.concatenate([[0.0, 0.0], np.repeat([2.0, 2.0001, 2.0002], 2), np.repeat(near, 2)])
+    above = np.concatenate([np.repeat(12.0 + 1e-3 * np.arange(14), 2), np.linspace(20.0, 180.0, 354)])
+    for seed in range(100):
+        values = np.random.default_rng(seed).permutation(np.concatenate([exact, above]))
+        matrix = sparse.csr_array(sparse.diags_array(values))
+        found, _ = lift_lowest(matrix, 10, 12.0, lambda fraction: None)
+        np.testing.assert_allclose(found, exact[:10], rtol=1e-8, atol=1e-9)
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-10])
