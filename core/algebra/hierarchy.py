@@ -153,7 +153,8 @@ def _strong(matrix: Rows, diagonal: Floats, slowest: Floats) -> sparse.csr_array
         return data[kept], column[kept], np.add.reduceat(kept, part.indptr[:-1], dtype=np.int32)
 
     data, column, count = (np.concatenate(values) for values in zip(*matrix.each(keep), strict=True))
-    return sparse.csr_array((data, column, np.append(0, np.cumsum(count))), shape=(len(slowest),) * 2)
+    start = np.cumsum(np.append(0, count), dtype=column.dtype)  # indices of two types would become the longer one
+    return sparse.csr_array((data, column, start), shape=(len(slowest),) * 2)
 
 
 def _single(matrix: sparse.csr_array) -> sparse.csr_array:
