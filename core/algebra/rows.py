@@ -10,11 +10,13 @@ from scipy import sparse
 
 from ..cores import cores
 from ..types import Array, Ints, Report
-from .blocks import blocks
+from .blocks import blocks, on_all_cores
 
 PART = 1 << 20  # entries of a matrix that are multiplied at once, at most: some hundredths of a second
 _LEAST = 1 << 17  # and at least, unless these are all: fewer are multiplied before another thread has started
 _FEW = 4  # columns, up to which products with one at a time are faster, by half
+
+_BLOCK = 1 << 13  # rows that are computed at one time
 
 Result = TypeVar("Result")
 
@@ -52,12 +54,13 @@ class Rows:
         rounded = self._dtype == np.float64 and other.dtype == np.float32
         dtype = other.dtype if rounded else np.result_type(self._dtype, other.dtype)
         result = np.empty((self._count, other.shape[1]), dtype=dtype)
-        columns = np.ascontiguousarray(other.T) if other.shape[1] <= _FEW else ()
+        few = 0 < other.shape[1] <= _FEW
+        other = np.ascontiguousarray(other.T if few else other)  # once: scipy would do so with all of it for each part
 
         def fill(rows: slice, part: sparse.csr_array) -> None:
             if rounded:
                 part = _matrix(part.data.astype(np.float32), part.indices, part.indptr, part.shape[1])
-            values = np.stack([part @ column for column in columns], axis=1) if len(columns) else part @ other
+            values = np.stack([part @ column for column in other], axis=1) if few else part @ other
             change(rows, values)
             result[rows] = values
 
@@ -69,6 +72,25 @@ class Rows:
         for result in self._map(function, self._slices, self._parts):
             self._report()
             yield result
+
+
+def matrix_by_rows(
+    function: Callable[[slice], sparse.csr_array], counts: Ints, width: int, report: Report = lambda: None
+) -> sparse.csr_array:
+    """Return the matrix, (n, width), of which a function computes the rows of each slice, on all cores.
+
+    Each row has so many entries, (n,). For `report` see `on_all_cores`.
+    """
+    start: Ints = np.append(0, np.cumsum(counts, dtype=np.int64))
+    start = start.astype(np.int32 if start[-1] < 2**31 else np.int64)
+    values, columns = np.empty(start[-1]), np.empty(start[-1], dtype=start.dtype)
+
+    def put(rows: slice) -> None:
+        part, entries = function(rows), slice(start[rows.start], start[rows.stop])
+        values[entries], columns[entries] = part.data, part.indices
+
+    on_all_cores(put, blocks(len(counts), _BLOCK), report)
+    return _matrix(values, columns, start, width)
 
 
 def _matrix(values: Array, columns: Ints, start: Ints, width: int) -> sparse.csr_array:

@@ -100,13 +100,21 @@ def scale_points(points: Floats, decisions: Decisions | None = None) -> ScaledPo
     return ScaledPoints(distinct[order], scale, rank[inverse], copies[order], first[order])
 
 
+def order_of(points: Floats) -> Ints:
+    """Return the order of points, (n, 3), by x, those of one x by y, and then by z: the same however they are given."""
+    order = np.argsort(points[:, 0])
+    if (np.diff(points[order, 0]) > 0.0).all():
+        return order
+    return np.lexsort(points.T[::-1])
+
+
 def _merge(points: Floats) -> tuple[Floats, Ints, Ints, Ints]:
     """Take points at one place, in scaled coordinates, as one.
 
     Return the m distinct ones, the first point at each of their places, (m,) int, the place of each point, (n,) int,
     and an order in which places follow each other that are near, (m,) int.
     """
-    order = np.lexsort(points.T[::-1])
+    order = order_of(points)
     ordered = points[order]
     new = np.append(True, (ordered[1:] != ordered[:-1]).any(axis=1))
     distinct, first, inverse = ordered[new], order[new], np.empty_like(order)

@@ -7,10 +7,11 @@ from scipy import sparse
 from scipy.sparse.linalg import ArpackNoConvergence
 from scipy.spatial import cKDTree
 
-from ..algebra import Rows, coarse_to_fine, lift_lowest, workers
+from ..algebra import Rows, blocks, coarse_to_fine, lift_lowest, matrix_by_rows, on_all_cores, workers
 from ..arguments import whole
 from ..errors import SolverError, TooFewPointsError, UnresolvedModesError
 from ..frozen import Frozen
+from ..geometry import order_of
 from ..kernel import inverse_ratio, symbol
 from ..memory import check_mode_memory
 from ..types import Floats, Ints, Progress, Report
@@ -19,6 +20,7 @@ TOLERANCE = 2e-7  # eigenvalues are then right to ten digits and more: their err
 
 _FEW = 0.01  # modes over points up to which multigrid is faster than Lanczos: of 6,000 to 50,000 random points
 _ALIKE = 1e-4  # relative difference up to which entries count as of one size, as on a symmetric shape
+_BLOCK = 1 << 13  # rows of vectors at one time
 _FLAT = 4.0  # k h beyond which the symbol is nearly constant
 
 
@@ -102,12 +104,22 @@ def solve_spectrum(
             f"The eigenvalue solver found {np.sum(residuals <= tolerance)} of {count} modes on {n} points to a residual"
             f" of {tolerance:g}. Ask for fewer modes, or raise the tolerance."
         )
-    vectors *= root[:, None]
+    result, parts = np.zeros((n, count)), blocks(len(order), _BLOCK)
+
+    def largest(rows: slice) -> Floats:
+        vectors[rows] *= root[rows, None]
+        return np.abs(vectors[rows]).max(axis=0)
+
     # Signs by the first of the largest entries: among equals, on a symmetric shape, rounding must not choose.
-    sizes = np.abs(vectors)
-    first = np.argmax(sizes >= (1.0 - _ALIKE) * sizes.max(axis=0), axis=0)
-    result = np.zeros((n, count))
-    result[order] = vectors * np.sign(vectors[first, np.arange(count)])
+    least = (1.0 - _ALIKE) * np.max(on_all_cores(largest, parts), axis=0)
+
+    def first_large(rows: slice) -> Floats:
+        large = np.abs(vectors[rows]) >= least
+        return np.sign(vectors[rows][large.argmax(axis=0), np.arange(count)]) * large.any(axis=0)
+
+    signs = np.array(on_all_cores(first_large, parts))
+    sign = signs[(signs != 0.0).argmax(axis=0), np.arange(count)]
+    on_all_cores(lambda rows: result.__setitem__(order[rows], vectors[rows] * sign), parts)
     return Spectrum(unit * np.maximum(values, 0.0), result, residuals)
 
 
@@ -154,19 +166,21 @@ def symmetric_form(
         Symmetric positive semi-definite [1 / L^2].
     """
     known = np.flatnonzero(component >= 0)
-    known = known[np.lexsort(points[known].T)]
+    known = known[order_of(points[known])]
     order = known[cKDTree(points[known]).indices]
     root = 1.0 / np.sqrt(areas[order])
     report()
     place = np.zeros(stiffness.shape[0], dtype=stiffness.indices.dtype)
     place[order] = np.arange(len(order))
-    matrix = stiffness[order]
-    rows = sparse.csr_array((matrix.data, place[matrix.indices], matrix.indptr), shape=(len(order),) * 2)
-    report()
-    matrix = rows.T.tocsr()  # the same, as it is symmetric; transposing sorts the columns, and so the sums of products
-    report()
-    matrix.data *= np.repeat(root, np.diff(matrix.indptr)) * root[matrix.indices]
-    return order, root, matrix
+
+    def arrange(rows: slice) -> sparse.csr_array:
+        part = stiffness[order[rows]]
+        part.indices, part.has_sorted_indices = place[part.indices], False
+        part.sort_indices()  # and so the sums of products
+        part.data *= np.repeat(root[rows], np.diff(part.indptr)) * root[part.indices]
+        return part
+
+    return order, root, matrix_by_rows(arrange, np.diff(stiffness.indptr)[order], len(order), report)
 
 
 def correct_eigenvalues(areas: Floats, widths: Floats, values: Floats, vectors: Floats) -> Floats:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
-from ..algebra import on_all_cores
+from ..algebra import matrix_by_rows, on_all_cores
 from ..geometry import Cloud, Pairs, Patch, ScaledPoints
 from ..kernel import SECOND_MOMENT, pair_kernel
 from ..types import Array, Bools, Floats, Ints
@@ -59,8 +59,10 @@ def assemble_stiffness(
     widths = _widths(pairs, distance, areas, weights, images, alone)
     stiffness = stiffness_matrix(scaled, pairs, weights, own)
     rows = images.rows[images.once]
-    mirrored = np.bincount(alone.rows[alone.once], alone.weights[alone.once], len(areas))
-    images = _symmetric(scaled, pairs.first[rows], pairs.second[rows], images.weights[images.once], mirrored)
+    m = len(areas)
+    mirrored = np.bincount(alone.rows[alone.once], alone.weights[alone.once], m)
+    once = sparse.csr_array((images.weights[images.once], (pairs.first[rows], pairs.second[rows])), shape=(m, m))
+    images = _symmetric(scaled, once, mirrored)
     return Stiffness(stiffness, images, residual, widths)
 
 
@@ -70,12 +72,13 @@ def stiffness_matrix(scaled: ScaledPoints, pairs: Pairs, weights: Floats, own: F
     Weights, (p,), of pairs of distinct points are overwritten; `own`, (m,), are those of each point with itself: the
     coupling of points at the same place, which share its area.
     """
-    if scaled.shared:
-        whole = _symmetric(scaled, pairs.first, pairs.second, weights, own)
-        return (sparse.diags_array(whole.sum(axis=1), format="csr") - whole).tocsr()
     half = pairs.half(weights)
+    if scaled.shared:
+        whole = _symmetric(scaled, half, own)
+        return (sparse.diags_array(whole.sum(axis=1), format="csr") - whole).tocsr()
     total = half.sum(axis=0) + half.sum(axis=1)
-    return _symmetric(scaled, pairs.first, pairs.second, np.negative(weights, out=weights), total)
+    np.negative(half.data, out=half.data)
+    return _symmetric(scaled, half, total)
 
 
 def _kernel_weights(cloud: Cloud, distance: Floats, areas: Floats) -> tuple[Floats, Floats, _Images, _Images]:
@@ -135,24 +138,37 @@ def _widths(pairs: Pairs, distance: Floats, areas: Floats, weights: Floats, imag
     return np.where(unit > 0.0, np.sqrt(moment / np.where(unit > 0.0, unit, 1.0)), pairs.lengths)
 
 
-def _symmetric(scaled: ScaledPoints, first: Ints, second: Ints, values: Floats, own: Array) -> sparse.csr_array:
-    """Return the symmetric matrix, (n, n), of quantities of pairs and of points with themselves, columns sorted.
+def _symmetric(scaled: ScaledPoints, half: sparse.csr_array, own: Array) -> sparse.csr_array:
+    """Return the symmetric matrix, (n, n), of quantities of points with others and with themselves, columns sorted.
 
-    Points at the same place share its weights.
+    The half, (m, m), holds each pair once. Points at the same place share its weights.
     """
     n, m = len(scaled.inverse), len(own)
     if scaled.shared:
         known = np.flatnonzero(scaled.inverse >= 0)
         row = scaled.inverse[known]
         spread = sparse.csr_array((1.0 / scaled.copies[row], (known, row)), shape=(n, m))
-        half = sparse.csr_array((values, (first, second)), shape=(m, m))
         alone = sparse.diags_array(own, dtype=np.float64)  # np.bincount of nothing gives integers, even with weights
         return (spread @ (half + half.T + alone) @ spread.T).tocsr()
-    caller = scaled.first.astype(np.int32)
-    ends = (np.concatenate([caller[end], caller]) for end in (first, second))
-    entries = sparse.coo_array((np.concatenate([values, 0.5 * own]), tuple(ends)), shape=(n, n))
-    entries.has_canonical_format = True  # no place twice: there is nothing to sum
-    half = entries.tocsr()
-    del entries  # large
-    half = half.T.tocsr()  # transposing sorts the columns, which makes the sum fast
-    return half + half.T.tocsr()
+    alone = sparse.csr_array((own, np.arange(m, dtype=np.int32), np.arange(m + 1, dtype=np.int32)), shape=(m, m))
+    parts, caller, counts = (half, half.T.tocsr(), alone), scaled.first.astype(np.int32), np.zeros(n, dtype=np.int32)
+    counts[caller] = sum(np.diff(part.indptr) - _zeros(part) for part in parts)
+
+    def join(rows: slice) -> sparse.csr_array:
+        place = scaled.inverse[rows]
+        place = place[place >= 0]
+        near = np.arange(3 * len(place)).reshape(3, -1).T.ravel()  # rows of the same point
+        joined = sparse.vstack([part[place] for part in parts], format="csr")[near]
+        entries = joined.data, caller[joined.indices], joined.indptr[::3]
+        result = sparse.csr_array(entries, shape=(len(place), n))
+        result.sort_indices()
+        result.eliminate_zeros()
+        return result
+
+    return matrix_by_rows(join, counts, n)
+
+
+def _zeros(matrix: sparse.csr_array) -> Ints:
+    """Return how many entries of each row are zero, such as those of pairs that are further along the surface."""
+    row = np.searchsorted(matrix.indptr, np.flatnonzero(matrix.data == 0.0), side="right") - 1
+    return np.bincount(row, minlength=matrix.shape[0])
