@@ -103,4 +103,14 @@ def on_all_cores(
 
 def by_blocks(function: Callable[[slice], Array], count: int) -> Array:
     """Return the array, (count, ...), of which a function computes the rows of each slice, on all cores."""
-    return np.concatenate(on_all_cores(function, blocks(count, _BLOCK) or [slice(0)]))
+    first, lock = list[Array](), Lock()
+
+    def put(rows: slice) -> None:
+        values = function(rows)
+        with lock:
+            if not first:
+                first.append(np.empty((count, *values.shape[1:]), dtype=values.dtype))
+        first[0][rows] = values
+
+    on_all_cores(put, blocks(count, _BLOCK) or [slice(0)])
+    return first[0]

@@ -4,11 +4,12 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from ..algebra import by_blocks
+from ..algebra import blocks, by_blocks, on_all_cores
 from ..types import Bools, Floats, Ints
 from .nearest import COUNT, NEXT, Nearest
 
 _GAP = 2.0  # an edge over this many distances to the 8th neighbor is a gap; a larger factor joins clumps of outliers
+_BLOCK = 1 << 13  # points whose neighbors are looked at at one time
 
 
 def even_reach(nearest: Nearest) -> Floats:
@@ -41,15 +42,22 @@ def label_components(nearest: Nearest, usual: float | None = None) -> Ints:
     strict, loose = find_gaps(nearest, usual)
     label = label_connected(index, strict)
     large = number_by_size(label, COUNT) >= 0
-    loose &= large[:, None] & large[index]
+    if not large.all():
+        loose &= large[:, None] & large[index]
     return number_large(label_connected(index, loose, label), large)
 
 
 def find_gaps(nearest: Nearest, usual: float) -> tuple[Bools, Bools]:
     """Tell which edges to neighbors, (m, 40) bool, are no gaps, and which are none between components of some size."""
     index, distance, reach = nearest.index[:, 1:], nearest.distance[:, 1:], gap_reach(nearest)
-    strict = distance <= np.maximum(np.minimum(reach[:, None], reach[index]), usual)
-    return strict, distance <= np.maximum(reach[:, None], reach[index])
+
+    def measure(rows: slice) -> Bools:
+        here, there = reach[rows, None], reach[index[rows]]
+        strict = distance[rows] <= np.maximum(np.minimum(here, there), usual)
+        return np.stack([strict, distance[rows] <= np.maximum(here, there)], axis=1)
+
+    strict, loose = np.moveaxis(by_blocks(measure, len(index)), 1, 0)
+    return strict, loose
 
 
 def number_large(label: Ints, large: Bools) -> Ints:
@@ -66,7 +74,7 @@ def label_connected(index: Ints, joined: Bools, label: Ints | None = None) -> In
     """
     label = np.arange(len(index), dtype=np.int32) if label is None else label
     # By the nearest neighbors first, for speed: hardly any other edge still joins two components then.
-    for some in (slice(0, NEXT), slice(NEXT, None)):
+    for some in (slice(0, 3), slice(3, NEXT), slice(NEXT, None)):
         if label.max() == 0:
             break
 
@@ -75,7 +83,7 @@ def label_connected(index: Ints, joined: Bools, label: Ints | None = None) -> In
             row, column = np.nonzero(joined[rows, some] & (other != label[rows, None]))
             return np.stack([label[rows][row], other[row, column]], axis=1)
 
-        ends = tuple(by_blocks(across, len(index)).T)
+        ends = tuple(np.concatenate(on_all_cores(across, blocks(len(index), _BLOCK))).T)
         graph = sparse.csr_array((np.ones(len(ends[0]), dtype=bool), ends), shape=(label.max() + 1,) * 2)
         label = connected_components(graph, directed=False)[1][label]
     return label

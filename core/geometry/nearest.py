@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from ..algebra import by_blocks
+from ..algebra import blocks, by_blocks, on_all_cores
 from ..cores import cores
 from ..types import Bools, Floats, Ints
 from .quadrics import Quadrics, chords, covariance, fit_quadrics, roundness
@@ -26,6 +26,7 @@ SMOOTH = 0.7  # cosine between normals of one smooth sheet, or between direction
 GAP = 2.5  # times the usual that a gap may be wide, as in rows 25 times denser along than across: else it is a hole
 ROW = 0.2  # roundness of the nearest points of a row: ten times denser along than across, and of the nearest eight
 WIDER = 1.3  # factor from each width of a kernel that is tried to the next
+_BLOCK = 1 << 13  # points whose neighbors are searched for at one time
 _MEASURED = 100_000  # points whose neighbors are searched for in a tenth of a second
 
 
@@ -54,7 +55,11 @@ class Nearest:
     @functools.cached_property
     def apart(self) -> Bools:
         """Which neighbors were left out, as they lie on another sheet, (m, 41) bool."""
-        return (self.weight == 0.0) & (fading_weights(self.distance) > 0.0)
+
+        def differ(rows: slice) -> Bools:
+            return np.asarray((self.weight[rows] == 0.0) & (fading_weights(self.distance[rows]) > 0.0))
+
+        return by_blocks(differ, len(self.weight))
 
     @functools.cached_property
     def quadrics(self) -> Quadrics:
@@ -72,8 +77,12 @@ class Nearest:
 
         A quadric has six coefficients: a point that would keep fewer than a dozen neighbors keeps all of them.
         """
-        few = np.count_nonzero(kept & (self.weight > 0.0), axis=1) < FEW
-        return replace(self, weight=np.where(kept | few[:, None], self.weight, 0.0))
+
+        def weigh(rows: slice) -> Floats:
+            few = np.count_nonzero(kept[rows] & (self.weight[rows] > 0.0), axis=1) < FEW
+            return np.where(kept[rows] | few[:, None], self.weight[rows], 0.0)
+
+        return replace(self, weight=by_blocks(weigh, len(kept)))
 
     def along_row(self, rows: Ints) -> Bools:
         """Tell of which of some points, (k,) int, the nearest eight neighbors lie along a row, (k,) bool."""
@@ -139,9 +148,14 @@ class Nearest:
 
 def find_nearest(points: Floats) -> Nearest:
     """Find the 40 nearest neighbors of every point, (m, 3)."""
-    tree = cKDTree(points)
-    distance, index = tree.query(points, k=min(COUNT, len(points)), workers=cores())
-    return Nearest(tree, index.astype(np.int32), distance, fading_weights(distance), np.zeros(len(points), dtype=bool))
+    tree, shape = cKDTree(points), (len(points), min(COUNT, len(points)))
+    distance, index = np.empty(shape), np.empty(shape, dtype=np.int32)
+
+    def search(rows: slice) -> None:
+        distance[rows], index[rows] = tree.query(points[rows], k=shape[1])
+
+    on_all_cores(search, blocks(len(points), _BLOCK))
+    return Nearest(tree, index, distance, fading_weights(distance), np.zeros(len(points), dtype=bool))
 
 
 def spacing_of(distance: Floats) -> Floats:

@@ -19,10 +19,9 @@ _BLOCK = 1 << 12  # points projected at one time
 
 def near_misfit(nearest: Nearest, rows: Ints | None = None) -> Floats:
     """Return how far quadrics through 20 neighbors miss these, of all m points or of some rows, (k,)."""
+    near = slice(None) if rows is None else rows, slice(COUNT // 2 + 1)  # with the point itself
     rows = np.arange(len(nearest.points)) if rows is None else rows
-    part = slice(COUNT // 2 + 1)  # with the point itself
-    weight = fading_weights(nearest.distance[rows, part])
-    return fit_quadrics(nearest.points, nearest.index[rows, part], weight, rows).misfit
+    return fit_quadrics(nearest.points, nearest.index[near], fading_weights(nearest.distance[near]), rows).misfit
 
 
 def mean_misfits(nearest: Nearest, *misfits: Floats) -> Floats:

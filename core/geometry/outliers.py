@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..algebra import blocks, on_all_cores
+from ..algebra import blocks, by_blocks, on_all_cores
 from ..types import Bools, Floats, Ints
 from .nearest import AGREEING, GAP, ON, Nearest
 from .noise import FILLING
@@ -94,7 +94,8 @@ def third_least(values: Floats) -> Floats:
 
 def third_heights(nearest: Nearest, surface: Quadrics, rows: Ints) -> Floats:
     """Return the third least height of some points over the quadrics of their witnesses, (k,)."""
-    return third_least(heights_over_witnesses(nearest, surface, rows))
+    heights = heights_over_witnesses(nearest, surface, rows)
+    return by_blocks(lambda part: third_least(heights[part]), len(rows))
 
 
 def heights_over_witnesses(nearest: Nearest, surface: Quadrics, rows: Ints) -> Floats:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ..algebra import blocks, eliminate, on_all_cores
+from ..algebra import blocks, by_blocks, eliminate, on_all_cores
 from ..errors import NotASurfaceError
 from ..types import Array, Floats, Ints
 
@@ -249,7 +249,12 @@ def eighths(x: Floats, y: Floats) -> Ints:
 
 def frames(normals: Floats) -> Floats:
     """Return orthonormal frames as columns (normal, and two tangents), (k, 3, 3)."""
-    axis = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
-    tangent = np.cross(normals, axis)
-    tangent /= np.linalg.norm(tangent, axis=1)[:, None]
-    return np.stack([normals, np.cross(normals, tangent), tangent], axis=2)
+
+    def frame(rows: slice) -> Floats:
+        normal = normals[rows]
+        axis = np.eye(3)[np.argmin(np.abs(normal), axis=1)]
+        tangent = np.cross(normal, axis)
+        tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+        return np.stack([normal, np.cross(normal, tangent), tangent], axis=2)
+
+    return by_blocks(frame, len(normals))

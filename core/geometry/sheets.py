@@ -168,10 +168,11 @@ def label_sheets(nearest: Nearest, normals: Floats, component: Ints) -> Ints:
 def join_touching(nearest: Nearest, sheet: Ints) -> Ints:
     """Return the sheets of points, (m,), those on small ones, -1 before, with the sheet that they touch."""
     # Few points, such as sharp tips, are joined to the sheet that they touch; what touches none lies off the surface.
-    touching = nearest.distance <= _AROUND * nearest.spacing[nearest.index]
     lost = np.flatnonzero(sheet < 0)
     while len(lost):
-        sheet[lost] = np.where(touching[lost], sheet[nearest.index[lost]], -1).max(axis=1)
+        index = nearest.index[lost]
+        touching = nearest.distance[lost] <= _AROUND * nearest.spacing[index]
+        sheet[lost] = np.where(touching, sheet[index], -1).max(axis=1)
         left = lost[sheet[lost] < 0]
         if len(left) == len(lost):
             break

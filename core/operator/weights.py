@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..algebra import blocks, chebyshev_steps, eliminate, on_all_cores
+from ..algebra import blocks, by_blocks, chebyshev_steps, eliminate, on_all_cores
 from ..geometry import LARGEST, MET, TERMS, Cloud, EdgeTerms, Patch, arc_ahead, dots, frames, lengthened, put_terms
 from ..kernel import SECOND_MOMENT
 from ..types import Floats, Ints, Report
@@ -17,6 +17,7 @@ from .curvature import second_moment, uneven
 _ROUNDS = 16  # of the solver, at most
 _SMALLEST = 1e-6  # residual of the moments that is solved for: by a larger one, results would change with the origin
 _BLOCK = 1 << 13  # points worked on at one time
+_KERNEL = np.eye(TERMS)[:, :1]  # moments of the kernel, (5, 1)
 _FASTEST = 2.5  # bound of the preconditioned eigenvalues: 2, and a margin, as the equations change on the way
 
 
@@ -70,9 +71,7 @@ def balance_weights(
     """
     lengths = cloud.pairs.lengths
     moments = _Moments(cloud, distance, weights, 4.0 * areas * _trace(cloud, weights, areas) / lengths**2, report)
-    goal = np.zeros((TERMS, len(areas)))
-    goal[0] = 1.0
-    terms, step = np.zeros_like(goal), np.zeros_like(goal)
+    terms, step = np.zeros((TERMS, len(areas))), np.zeros((TERMS, len(areas)))
     slowest = _FASTEST / (1.0 + 0.25 * _ROUNDS**2)  # so many rounds reduce its component to 1 / cosh(4)
     rates = chebyshev_steps(slowest, _FASTEST)
     for number in range(_ROUNDS + 1):
@@ -80,24 +79,40 @@ def balance_weights(
             found, inverse = moments.with_inverse(terms)
         else:
             found = moments.of(terms)
-        missing = goal - found
-        residual = np.sqrt(dots(missing, missing))
+        residual = _residual(found)
         if number == _ROUNDS or residual.max() < _SMALLEST:
             break
         kept, rate = next(rates) if number else (0.0, 0.5)
-        step = _next_step(step, kept, rate, inverse, missing - MET * terms)
-        step[:, residual < _SMALLEST] = 0.0
-        terms += step
+        step = _take_step(terms, step, kept, rate, inverse, found, residual)
     return Balance(moments.factor, residual)
 
 
-def _next_step(before: Floats, kept: float, rate: float, inverse: Floats, gradient: Floats) -> Floats:
-    """Return the steps of the coefficients of points, (5, m), from those before, of length one at most."""
+def _residual(found: Floats) -> Floats:
+    """Return by how much moments, (5, m), miss those of the kernel, (m,)."""
+
+    def measure(rows: slice) -> Floats:
+        missing = _KERNEL - found[:, rows]
+        return np.sqrt(dots(missing, missing))
+
+    return by_blocks(measure, found.shape[1])
+
+
+def _take_step(
+    terms: Floats, before: Floats, kept: float, rate: float, inverse: Floats, found: Floats, residual: Floats
+) -> Floats:
+    """Add the next steps to the coefficients of points, (5, m), in place; return them.
+
+    They follow from those before and from the moments found, and are of length one at most.
+    """
     result = np.empty_like(before)
 
     def change(rows: slice) -> None:
-        step = kept * before[:, rows] + rate * np.einsum("abm,bm->am", inverse[:, :, rows], gradient[:, rows])
-        np.divide(step, np.maximum(np.sqrt(dots(step, step)), 1.0), out=result[:, rows])
+        gradient = _KERNEL - found[:, rows] - MET * terms[:, rows]
+        step = kept * before[:, rows] + rate * np.einsum("abm,bm->am", inverse[:, :, rows], gradient)
+        step /= np.maximum(np.sqrt(dots(step, step)), 1.0)
+        step[:, residual[rows] < _SMALLEST] = 0.0
+        result[:, rows] = step
+        terms[:, rows] += step
 
     on_all_cores(change, blocks(before.shape[1], _BLOCK))
     return result
