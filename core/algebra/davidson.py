@@ -273,14 +273,14 @@ def _image(dual: Floats, values: Floats, residual: Array) -> Floats:
 
 
 def _rest(level: Level, mass: sparse.csr_array | None, load: Array, change: Array, shifts: Array) -> Array:
-    """Return ``load - (matrix - shifts * mass) change`` in single precision."""
+    """Return ``load - (matrix - shifts * mass) change`` in single precision, in the memory of the load."""
     weighed = _weighed(mass, change)
 
     def subtract(rows: slice, values: Array) -> None:
         np.subtract(load[rows], values, out=values)
         values += weighed[rows] * shifts
 
-    return level.matrix.product(change, subtract)
+    return level.matrix.product(change, subtract, load)
 
 
 def _lengths(vectors: Array) -> Array:

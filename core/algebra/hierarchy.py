@@ -296,7 +296,11 @@ def _cycle(levels: list[Level], inverse: Floats, load: Array) -> Array:
 
 
 def smoothed(level: Level, load: Array, result: Array, steps: list[Array]) -> Array:
-    """Return an approximate solution after some steps of the smoother: residuals times step lengths."""
+    """Return an approximate solution after some steps of the smoother: residuals times step lengths.
+
+    The memory of the one before is used.
+    """
+    spare = None
     for step in steps:
 
         def improve(rows: slice, values: Array, step: Array = step, before: Array = result) -> None:
@@ -304,5 +308,5 @@ def smoothed(level: Level, load: Array, result: Array, steps: list[Array]) -> Ar
             values *= step[rows]
             values += before[rows]
 
-        result = level.strong.product(result, improve)
+        result, spare = level.strong.product(result, improve, spare), result
     return result

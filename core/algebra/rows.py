@@ -46,14 +46,15 @@ class Rows:
             return sparse.vstack(list(self.each(lambda rows, part: part @ other)), format="csr")
         return self.product(other, lambda rows, values: None)
 
-    def product(self, other: Array, change: Callable[[slice, Array], None]) -> Array:
+    def product(self, other: Array, change: Callable[[slice, Array], None], out: Array | None = None) -> Array:
         """Multiply with an array, (m, k), and change each part of the product, in place, while it is in the cache.
 
         That with an array of single precision is single: the parts are rounded, which takes less time than the product.
+        It is written to an array that is given, of which each part may be read until it is changed.
         """
         rounded = self._dtype == np.float64 and other.dtype == np.float32
         dtype = other.dtype if rounded else np.result_type(self._dtype, other.dtype)
-        result = np.empty((self._count, other.shape[1]), dtype=dtype)
+        result = np.empty((self._count, other.shape[1]), dtype=dtype) if out is None else out
         few = 0 < other.shape[1] <= _FEW
         other = np.ascontiguousarray(other.T if few else other)  # once: scipy would do so with all of it for each part
 
