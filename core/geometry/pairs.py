@@ -56,20 +56,30 @@ class Pairs:
             first, second = values(patch)
             return patch.over_first(first), patch.over_second(second)
 
-        total, found = np.zeros((count, len(self.points))), on_all_cores(sums, self.patches, report)
+        total = np.zeros((count, len(self.points)))
+        if not self.patches:
+            return total
+        joined = self._joined
+        found = [part for parts in on_all_cores(sums, self.patches, report) for part in parts]
 
-        def add(row: int) -> None:  # both axes at once take three times as long
-            for patch, (first, second) in zip(self.patches, found, strict=True):
-                total[row][patch.rows] += first[row]
-                total[row][patch.columns] += second[row]
+        def join(row: int) -> None:
+            total[row] = joined @ np.concatenate([part[row] for part in found])
 
-        on_all_cores(add, range(count))
+        on_all_cores(join, range(count))
         return total
 
     @functools.cached_property
     def patches(self) -> list[Patch]:
         """The pairs by blocks that fit the cache: a list of `Patch`."""
         return divide_pairs(self.start, self.second)
+
+    @functools.cached_property
+    def _joined(self) -> sparse.csr_array:
+        """The matrix, (m, sums), that adds at each point what patches summed over first, and over second, points."""
+        places = [rows.astype(np.int32) for patch in self.patches for rows in (patch.rows, patch.columns)]
+        place = np.concatenate(places)
+        start = np.arange(len(place) + 1, dtype=np.int32)
+        return sparse.csc_array((np.ones(len(place)), place, start), shape=(len(self.points), len(place))).tocsr()
 
     @functools.cached_property
     def start(self) -> Ints:
