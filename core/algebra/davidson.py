@@ -1,14 +1,13 @@
 """Few eigenpairs of many unknowns: on coarse versions of the matrix first, then by Davidson's method in a block."""
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from scipy import sparse
 from scipy.linalg import eigh
 
 from ..types import Array, Floats, Ints
-from .blocks import blocks, on_all_cores, shares, workers
+from .blocks import blocks, by_blocks, on_all_cores, shares, workers
 from .chebyshev import chebyshev_steps
 from .dense import multiply, product, subtract_product
 from .hierarchy import LARGE, SMALL, Known, Level, build_levels, smoothed, solve_roughly
@@ -66,30 +65,30 @@ def coarse_to_fine(
         if not levels or last.shape[0] > max(least, _DENSE):
             return None
         values, vectors = eigh(last.toarray(), mass.toarray())
-        coarsest = _known(values, vectors, mass)
+        coarsest = _known(values, vectors, mass @ vectors)
         flat = np.searchsorted(values, 1e-9 * values[-1])  # dimension of the null space: one for each component
         for number in reversed(range(len(levels))):
             level, finest = levels[number], number == 0
             beyond = np.searchsorted(values, (1.0 + _BEYOND) * values[min(count, len(values)) - 1])
             size = min(max(min(max(beyond, count), 2 * count + _WIDE), flat) + _GUARDS, len(values))
             vectors = level.extension @ vectors[:, : size if finest else 2 * size].astype(np.float32)
-            vectors = smoothed(level, np.zeros_like(vectors), vectors, level.steps)
+            vectors = smoothed(level, np.zeros((len(vectors), 1), dtype=np.float32), vectors, level.steps)
             guards = _random(len(vectors), max(_RANDOM, count + _RANDOM - vectors.shape[1])).astype(np.float32)
             for _ in range(_FILTERED):
                 guards = solve_roughly(levels[number:], coarsest, guards, np.zeros(guards.shape[1], np.float32), size)
-                guards /= _lengths(guards)
-            vectors = np.concatenate([vectors, guards], axis=1, dtype=np.float64)
+                _normalize(guards)
+            vectors = _beside(vectors, guards)
             wanted, goal, limit = (count, tolerance, _STEPS) if finest else (size, _COARSE, _COARSE_STEPS)
             values, vectors, right = refine(
                 levels[number:], coarsest, vectors, size, wanted, goal, scale, limit, report, finest
             )
             if not finest:
-                level.known = _known(values, vectors, level.mass)
+                level.known = _known(values, vectors, level.weighed(vectors))
     return (values[:count], vectors[:, :count]) if right else None
 
 
-def _known(values: Floats, vectors: Floats, mass: sparse.csr_array | None) -> Known:
-    return Known(values, vectors.astype(np.float32), _weighed(mass, vectors).astype(np.float32))
+def _known(values: Floats, vectors: Floats, duals: Floats) -> Known:
+    return Known(values, vectors.astype(np.float32), duals.astype(np.float32))
 
 
 def refine(
@@ -135,7 +134,6 @@ def refine(
         All residuals reached their goals.
     """
     level, count, worst = levels[0], vectors.shape[1], 0.0
-    rough_mass = None if level.mass is None else level.mass.astype(np.float32)
     before = excess = np.inf
     drift = np.inf  # bound on the rounding error of `image`, updated step by step; 0 for an exact product
     for step in range(limit + 1):
@@ -145,11 +143,11 @@ def refine(
             drift, count = np.inf, vectors.shape[1]
         if drift > 0.1 * tolerance:
             drift, image = 0.0, level.matrix @ vectors
-            values, basis = eigh(product(vectors.T, image), product(vectors.T, _weighed(level.mass, vectors)))
+            values, basis = eigh(product(vectors.T, image), product(vectors.T, level.weighed(vectors)))
             _turn(vectors, basis)
             _turn(image, basis)
         report()
-        dual = _weighed(level.mass, vectors)
+        dual = level.weighed(vectors)
         residual, norms = _residual(image, dual, values)
         del image  # large, and restored from the residual
         measure = max(values[wanted - 1], scale)
@@ -175,10 +173,10 @@ def refine(
         active = np.flatnonzero(residuals > 0.5 * goals)
         cycles = max(np.ceil(np.log(excess) / np.log(_FALL)), 1.0)  # spread evenly over the fewest steps
         cycles = int(np.ceil(cycles / np.ceil(cycles / _CYCLES)))
-        change = _corrections(levels, coarsest, rough_mass, vectors, dual, residual, values, active, size, cycles)
+        change = _corrections(levels, coarsest, vectors, dual, residual, values, active, size, cycles)
         report()
         # Rayleigh-Ritz on the vectors and an orthonormal basis of their corrections.
-        lengths, basis = eigh(product(change.T, _weighed(rough_mass, change)).astype(np.float64))
+        lengths, basis = eigh(product(change.T, level.weighed(change)).astype(np.float64))
         kept = lengths > 1e-5 * lengths[-1]  # the others are rounding error
         basis = basis[:, kept] / np.sqrt(lengths[kept])
         coupling = product(residual.T, change) @ basis
@@ -202,7 +200,6 @@ def refine(
 def _corrections(
     levels: list[Level],
     coarsest: Known,
-    mass: sparse.csr_array | None,
     vectors: Floats,
     dual: Floats,
     residual: Array,
@@ -215,26 +212,47 @@ def _corrections(
 
     They are computed for some of them at a time, as a V-cycle takes several times their memory.
     """
-    level, result = levels[0], np.zeros((len(vectors), len(active)), dtype=np.float32)
+    level, result = levels[0], np.empty((len(vectors), len(active)), dtype=np.float32)
     turns = -(-len(active) // max(_COLUMNS, _ENTRIES // len(vectors)))
     for part in shares(len(active), turns):
-        load, shifts = np.take(residual, active[part], axis=1), values[active[part]].astype(np.float32)
-        load /= _lengths(load)
+        load, shifts = _columns(residual, active[part]), values[active[part]].astype(np.float32)
+        _normalize(load)
         relative = shifts / np.float32(values[size - 1])
-        rates, change = chebyshev_steps(*_CYCLED), np.zeros_like(load)
+        rates, change = chebyshev_steps(*_CYCLED), None
         for left in reversed(range(cycles)):
             cycle = solve_roughly(levels, coarsest, load, relative, size)
             subtract_product(cycle, vectors, product(dual.T, cycle))
-            kept, rate = next(rates)
-            change *= kept
-            cycle *= rate
-            change += cycle
-            del cycle
-            result[:, part] += change
+            change = _advance(change, cycle, *next(rates), result[:, part])
             if left:
-                load = _rest(level, mass, load, change, shifts)
-    result /= _lengths(result)
+                load = _rest(level, load, change, shifts)
+    _normalize(result)
     return result
+
+
+def _advance(change: Array | None, cycle: Array, kept: float, rate: float, result: Array) -> Array:
+    """Return ``kept * change + rate * cycle``, in the memory of the cycle, and add it to the result."""
+
+    def advance(rows: slice) -> None:
+        cycle[rows] *= rate
+        if change is None:
+            result[rows] = cycle[rows]
+        else:
+            change[rows] *= kept
+            cycle[rows] += change[rows]
+            result[rows] += cycle[rows]
+
+    on_all_cores(advance, blocks(len(cycle), _BLOCK))
+    return cycle
+
+
+def _columns(vectors: Array, columns: Ints) -> Array:
+    """Return some columns, (k,), of vectors, contiguous."""
+    return by_blocks(lambda rows: np.take(vectors[rows], columns, axis=1), len(vectors))
+
+
+def _beside(vectors: Array, others: Array) -> Floats:
+    """Return the columns of both in double precision."""
+    return by_blocks(lambda rows: np.concatenate([vectors[rows], others[rows]], axis=1, dtype=np.float64), len(vectors))
 
 
 def _turn(vectors: Floats, basis: Floats, added: tuple[Array, Array] | None = None) -> None:
@@ -272,9 +290,9 @@ def _image(dual: Floats, values: Floats, residual: Array) -> Floats:
     return result
 
 
-def _rest(level: Level, mass: sparse.csr_array | None, load: Array, change: Array, shifts: Array) -> Array:
+def _rest(level: Level, load: Array, change: Array, shifts: Array) -> Array:
     """Return ``load - (matrix - shifts * mass) change`` in single precision, in the memory of the load."""
-    weighed = _weighed(mass, change)
+    weighed = level.weighed(change)
 
     def subtract(rows: slice, values: Array) -> None:
         np.subtract(load[rows], values, out=values)
@@ -283,14 +301,12 @@ def _rest(level: Level, mass: sparse.csr_array | None, load: Array, change: Arra
     return level.matrix.product(change, subtract, load)
 
 
-def _lengths(vectors: Array) -> Array:
-    """Return the lengths of the columns, never zero."""
-    return np.sqrt(np.maximum(np.einsum("ij,ij->j", vectors, vectors), np.finfo(np.float32).tiny))
-
-
-def _weighed(mass: sparse.csr_array | None, vectors: Array) -> Any:
-    """Return the product with the mass; None stands for the identity."""
-    return vectors if mass is None else mass @ vectors
+def _normalize(vectors: Array) -> None:
+    """Divide columns by their lengths, in place; one of zeros stays so."""
+    parts = blocks(len(vectors), _BLOCK)
+    squares = sum(on_all_cores(lambda rows: np.einsum("ij,ij->j", vectors[rows], vectors[rows]), parts))
+    lengths = np.sqrt(np.maximum(squares, np.finfo(np.float32).tiny))
+    on_all_cores(lambda rows: np.divide(vectors[rows], lengths, out=vectors[rows]), parts)
 
 
 def _random(count: int, columns: int, seed: int = 0) -> Floats:

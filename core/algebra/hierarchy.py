@@ -9,6 +9,7 @@ from scipy.linalg import pinvh
 from scipy.sparse.linalg import LinearOperator
 
 from ..types import Array, Floats, Ints, Report
+from .blocks import on_all_cores
 from .dense import product
 from .eigenvalue import rough_largest_eigenvalue
 from .rows import Rows
@@ -37,13 +38,17 @@ class Level:
 
     matrix: Rows  # (n, n)
     strong: Rows  # (n, n), the same without weak couplings, in single precision, for the smoother
-    mass: sparse.csr_array | None  # (n, n), inner product of its functions; none stands for the identity
+    mass: Rows | None  # (n, n), inner product of its functions; none stands for the identity
     top: float  # largest eigenvalue, about
     steps: list[Array]  # (n, 1) float32 each, step lengths of the Chebyshev smoother, divided by the diagonal
     # (n, m) and (m, n), interpolation from the next level to this one, in single precision, and its transpose
     extension: Rows
     restriction: Rows
     known: Known | None = None
+
+    def weighed(self, vectors: Array) -> Array:
+        """Return the product of vectors, (n, k), with the mass."""
+        return vectors if self.mass is None else self.mass.product(vectors, lambda rows, values: None)
 
 
 def build_levels(
@@ -108,7 +113,7 @@ def build_levels(
             Level(
                 matrix=rows,
                 strong=Rows(_single(strong), pool, report),
-                mass=mass,
+                mass=None if mass is None else Rows(mass, pool, report),
                 top=top * highest,
                 steps=[step[:, None].astype(np.float32) for step in smoothing_steps(top, smooth)],
                 extension=Rows(_single(prolongation), pool, report),
@@ -152,7 +157,7 @@ def _strong(matrix: Rows, diagonal: Floats, slowest: Floats) -> sparse.csr_array
         data[itself] += lost / slowest[rows]
         return data[kept], column[kept], np.add.reduceat(kept, part.indptr[:-1], dtype=np.int32)
 
-    data, column, count = (np.concatenate(values) for values in zip(*matrix.each(keep), strict=True))
+    data, column, count = on_all_cores(np.concatenate, list(zip(*matrix.each(keep), strict=True)))
     start = np.cumsum(np.append(0, count), dtype=column.dtype)  # indices of two types would become the longer one
     return sparse.csr_array((data, column, start), shape=(len(slowest),) * 2)
 
@@ -175,7 +180,7 @@ def aggregates(matrix: Rows, diagonal: Floats, share: float, report: Report) -> 
         kept = itself | (-part.data > share * np.minimum(diagonal[row], diagonal[part.indices]))
         return row[kept], part.indices[kept], np.where(itself[kept], np.inf, -part.data[kept])
 
-    row, column, weight = (np.concatenate(values) for values in zip(*matrix.each(strong), strict=True))
+    row, column, weight = on_all_cores(np.concatenate, list(zip(*matrix.each(strong), strict=True)))
     n = len(diagonal)
     first = np.searchsorted(row, np.arange(n, dtype=np.int32))
     rank, root = np.random.default_rng(0).permutation(n).astype(np.int32), np.zeros(n, dtype=bool)
