@@ -135,7 +135,7 @@ def refine(
     """
     level, count, worst = levels[0], vectors.shape[1], 0.0
     before = excess = np.inf
-    drift = np.inf  # bound on the rounding error of `image`, updated step by step; 0 for an exact product
+    drift = np.inf  # bound on the rounding error of `residual`, updated step by step; 0 for an exact product
     for step in range(limit + 1):
         if final and step % _PATIENCE == _PATIENCE - 1 and excess > max(1.0, 0.5 * before):
             # It stalls: the block may cut an eigenspace in two. Widen it.
@@ -146,10 +146,10 @@ def refine(
             values, basis = eigh(product(vectors.T, image), product(vectors.T, level.weighed(vectors)))
             _turn(vectors, basis)
             _turn(image, basis)
+            dual = level.weighed(vectors)
+            residual, norms = _residual(image, dual, values)
+            del image
         report()
-        dual = level.weighed(vectors)
-        residual, norms = _residual(image, dual, values)
-        del image  # large, and restored from the residual
         measure = max(values[wanted - 1], scale)
         residuals = norms / measure
         # Vectors just beyond the wanted ones must converge, too, or these stall, or a lower eigenvalue is missed. There
@@ -176,22 +176,20 @@ def refine(
         change = _corrections(levels, coarsest, vectors, dual, residual, values, active, size, cycles)
         report()
         # Rayleigh-Ritz on the vectors and an orthonormal basis of their corrections.
-        lengths, basis = eigh(product(change.T, level.weighed(change)).astype(np.float64))
+        weighed = level.weighed(change)
+        lengths, basis = eigh(product(change.T, weighed).astype(np.float64))
         kept = lengths > 1e-5 * lengths[-1]  # the others are rounding error
         basis = basis[:, kept] / np.sqrt(lengths[kept])
         coupling = product(residual.T, change) @ basis
-        image = _image(dual, values, residual)
-        del dual, residual
         report()
         changed = level.matrix @ change
         own = basis.T @ product(change.T, changed) @ basis
-        values, parts = eigh(np.block([[np.diag(values), coupling], [coupling.T, own]]))
-        values, parts = values[:count], parts[:, :count]
-        share = (basis @ parts[count:]).astype(np.float32)
+        ritz, parts = eigh(np.block([[np.diag(values), coupling], [coupling.T, own]]))
+        ritz, parts, share = ritz[:count], parts[:count, :count], (basis @ parts[count:, :count]).astype(np.float32)
         report()
-        _turn(vectors, parts[:count], (change, share))
-        _turn(image, parts[:count], (changed, share))
-        del change, changed
+        norms = _renew(vectors, dual, residual, (values, ritz), parts, (change, weighed, changed), share)
+        values = ritz
+        del change, weighed, changed
         lost = np.linalg.norm(share[:, :wanted], axis=0).max()
         drift += np.finfo(np.float32).eps * level.top * lost / measure
     return values, vectors, bool(excess <= 1.0)
@@ -255,12 +253,11 @@ def _beside(vectors: Array, others: Array) -> Floats:
     return by_blocks(lambda rows: np.concatenate([vectors[rows], others[rows]], axis=1, dtype=np.float64), len(vectors))
 
 
-def _turn(vectors: Floats, basis: Floats, added: tuple[Array, Array] | None = None) -> None:
-    """Compute ``vectors @ basis`` in place, and add the product of two other matrices."""
+def _turn(vectors: Floats, basis: Floats) -> None:
+    """Compute ``vectors @ basis`` in place."""
 
     def turn(rows: slice) -> None:
-        turned = multiply(vectors[rows], basis)
-        vectors[rows] = turned if added is None else turned + multiply(added[0][rows], added[1])
+        vectors[rows] = multiply(vectors[rows], basis)
 
     on_all_cores(turn, blocks(len(vectors), _BLOCK))
 
@@ -274,20 +271,36 @@ def _residual(image: Floats, dual: Floats, values: Floats) -> tuple[Array, Float
         result[rows] = missed
         return np.einsum("ij,ij->j", missed, missed)
 
-    squares = sum(on_all_cores(subtract, blocks(len(image), _BLOCK)), np.zeros(len(values)))
-    return result, np.sqrt(np.maximum(squares, np.finfo(np.float32).tiny))
+    return result, _roots(on_all_cores(subtract, blocks(len(image), _BLOCK)))
 
 
-def _image(dual: Floats, values: Floats, residual: Array) -> Floats:
-    """Return ``dual * values + residual``."""
-    result = np.empty(dual.shape)
+def _renew(
+    vectors: Floats,
+    dual: Floats,
+    residual: Array,
+    values: tuple[Floats, Floats],
+    parts: Floats,
+    added: tuple[Array, Array, Array],
+    share: Array,
+) -> Floats:
+    """Turn vectors to ``vectors @ parts + change @ share``, with their products and residuals, all in place.
 
-    def restore(rows: slice) -> None:
-        np.multiply(dual[rows], values, out=result[rows])
-        result[rows] += residual[rows]
+    Values are those before and after; the change is added with its products with the mass and with the matrix. Return
+    the lengths of the residuals, never zero.
+    """
+    change, weighed, changed = added
+    before, after = values
 
-    on_all_cores(restore, blocks(len(dual), _BLOCK))
-    return result
+    def renew(rows: slice) -> Floats:
+        image = multiply(dual[rows] * before + residual[rows], parts) + multiply(changed[rows], share)
+        if dual is not vectors:
+            dual[rows] = multiply(dual[rows], parts) + multiply(weighed[rows], share)
+        vectors[rows] = multiply(vectors[rows], parts) + multiply(change[rows], share)
+        image -= dual[rows] * after
+        residual[rows] = image
+        return np.einsum("ij,ij->j", image, image)
+
+    return _roots(on_all_cores(renew, blocks(len(vectors), _BLOCK)))
 
 
 def _rest(level: Level, load: Array, change: Array, shifts: Array) -> Array:
@@ -304,9 +317,13 @@ def _rest(level: Level, load: Array, change: Array, shifts: Array) -> Array:
 def _normalize(vectors: Array) -> None:
     """Divide columns by their lengths, in place; one of zeros stays so."""
     parts = blocks(len(vectors), _BLOCK)
-    squares = sum(on_all_cores(lambda rows: np.einsum("ij,ij->j", vectors[rows], vectors[rows]), parts))
-    lengths = np.sqrt(np.maximum(squares, np.finfo(np.float32).tiny))
+    lengths = _roots(on_all_cores(lambda rows: np.einsum("ij,ij->j", vectors[rows], vectors[rows]), parts))
     on_all_cores(lambda rows: np.divide(vectors[rows], lengths, out=vectors[rows]), parts)
+
+
+def _roots(squares: list[Array]) -> Array:
+    """Return lengths, never zero, by the sums of squares of parts."""
+    return np.sqrt(np.maximum(sum(squares), np.finfo(np.float32).tiny))
 
 
 def _random(count: int, columns: int, seed: int = 0) -> Floats:
