@@ -303,7 +303,7 @@ def _cycle(levels: list[Level], inverse: Floats, load: Array) -> Array:
 def smoothed(level: Level, load: Array, result: Array, steps: list[Array]) -> Array:
     """Return an approximate solution after some steps of the smoother: residuals times step lengths.
 
-    The memory of the one before is used.
+    The memory of the given one is used.
     """
     spare = None
     for step in steps:

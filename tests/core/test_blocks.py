@@ -6,7 +6,7 @@ from threadpoolctl import get_cached_controller
 
 import core
 from benchmarks.samplings import fibonacci_sphere
-from core.algebra.blocks import blocks, on_all_cores, workers
+from core.algebra.blocks import blocks, by_blocks, on_all_cores, workers
 
 
 @pytest.mark.parametrize(("count", "size"), [(10, 3), (9, 3), (2, 5), (0, 4)])
@@ -26,6 +26,12 @@ def test_cores_share_blocks_evenly():
 @pytest.mark.parametrize("parts", [[], [3], list(range(20))])
 def test_results_come_in_the_order_of_the_parts(parts):
     assert on_all_cores(lambda part: part**2, parts) == [part**2 for part in parts]
+
+
+@pytest.mark.parametrize("count", [0, 1, 20_000])
+def test_rows_of_an_array_come_in_their_order(count):
+    found = by_blocks(lambda rows: np.arange(count)[rows, None] * np.array([1, 10]), count)
+    np.testing.assert_array_equal(found, np.arange(count)[:, None] * [1, 10])
 
 
 def test_no_further_part_is_begun_after_a_cancel():

@@ -12,7 +12,7 @@ import core
 from benchmarks.samplings import random_sphere
 from core.algebra import coarse_to_fine, davidson, hierarchy, solvers
 from core.algebra.hierarchy import approximate_inverse
-from core.algebra.rows import PART, Rows
+from core.algebra.rows import PART, Rows, matrix_by_rows
 from core.algebra.solvers import conjugate_gradients, solve_symmetric
 
 PAIRS = [(k, j) for k in range(2) for j in range(3)]
@@ -272,8 +272,23 @@ def test_a_product_is_changed_part_by_part_in_the_precision_of_its_columns(monke
 
     with ThreadPoolExecutor(2) as pool:
         found = Rows(matrix, pool, silent).product(other, subtract)
+        exact = load - matrix @ other
+        written = Rows(matrix, pool, silent).product(np.asfortranarray(other), subtract, load)
     assert found.dtype == dtype
-    np.testing.assert_allclose(found, load - matrix @ other, rtol=0.0, atol=tolerance)
+    assert written is load
+    np.testing.assert_allclose(found, exact, rtol=0.0, atol=tolerance)
+    np.testing.assert_array_equal(written, found)
+
+
+@pytest.mark.parametrize("block", [1, 7, 100])
+def test_a_matrix_is_put_together_from_its_rows(monkeypatch, block):
+    monkeypatch.setattr("core.algebra.rows._BLOCK", block)
+    matrix = sparse.random_array((60, 40), density=0.05, rng=np.random.default_rng(0)).tocsr()
+    counts = np.diff(matrix.indptr)
+    assert (counts == 0).any()
+    found = matrix_by_rows(lambda rows: matrix[rows], counts, 40)
+    assert found.indices.dtype == found.indptr.dtype == np.int32
+    np.testing.assert_array_equal(found.toarray(), matrix.toarray())
 
 
 @pytest.mark.parametrize("name", CLOUDS)
@@ -285,6 +300,7 @@ def test_a_matrix_without_weak_couplings_is_about_the_same(operators, name):
     with ThreadPoolExecutor(2) as pool:
         strong = hierarchy._strong(Rows(matrix, pool, silent), matrix.diagonal(), root)
     assert strong.nnz < 0.8 * matrix.nnz
+    assert strong.indices.dtype == strong.indptr.dtype == matrix.indices.dtype
     assert abs(strong - strong.T).max() <= 1e-12 * abs(matrix).max()
     np.testing.assert_allclose(strong @ root, matrix @ root, rtol=0.0, atol=1e-12 * abs(matrix).max())
     smooth = root * np.sin(3.0 * laplacian.points[:, 0])
