@@ -223,7 +223,7 @@ def _cores(count):
     note = (
         f"{count:,} points on some of the cores. Python's lock is held by what scipy finds in graphs: the minimum"
         " spanning tree along which signs of normals are passed on, paths along sheets, components. One core alone"
-        " builds trees of points, sorts, and puts matrices together."
+        " builds trees of points, and sorts."
     )
     return Table("Cores", header, rows, note)
 
