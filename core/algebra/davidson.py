@@ -27,6 +27,7 @@ _STEPS, _COARSE_STEPS = 24, 8  # at most; two to six are usual on the points, tw
 _COLUMNS = 40  # in a V-cycle at one time, at least: with 20, products take a quarter more time; with 72, an eighth less
 _ENTRIES = 1 << 24  # of these columns, up to which there may be more: of 200,000 points all of 50 modes
 _BLOCK = 1 << 11  # rows of vectors worked on at one time
+_PART = 1 << 18  # entries of vectors that are scaled and added at one time
 _PATIENCE = 12  # steps after which the block of vectors is widened, where it stalls
 
 
@@ -239,7 +240,7 @@ def _advance(change: Array | None, cycle: Array, kept: float, rate: float, resul
             cycle[rows] += change[rows]
             result[rows] += cycle[rows]
 
-    on_all_cores(advance, blocks(len(cycle), _BLOCK))
+    on_all_cores(advance, _few_parts(cycle))
     return cycle
 
 
@@ -316,9 +317,14 @@ def _rest(level: Level, load: Array, change: Array, shifts: Array) -> Array:
 
 def _normalize(vectors: Array) -> None:
     """Divide columns by their lengths, in place; one of zeros stays so."""
-    parts = blocks(len(vectors), _BLOCK)
+    parts = _few_parts(vectors)
     lengths = _roots(on_all_cores(lambda rows: np.einsum("ij,ij->j", vectors[rows], vectors[rows]), parts))
     on_all_cores(lambda rows: np.divide(vectors[rows], lengths, out=vectors[rows]), parts)
+
+
+def _few_parts(vectors: Array) -> list[slice]:
+    """Divide the rows of vectors into parts, of which fewer entries would not be worth another thread."""
+    return blocks(len(vectors), max(1, _PART // vectors.shape[1]))
 
 
 def _roots(squares: list[Array]) -> Array:
