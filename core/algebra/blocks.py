@@ -1,9 +1,9 @@
 """Work in blocks that fit the cache, on all cores: numpy and scipy let other threads run while they work on arrays."""
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager
-from threading import Lock
+from threading import Lock, local
 from typing import Any, TypeVar
 
 import numpy as np
@@ -18,6 +18,7 @@ Result = TypeVar("Result")
 _BLOCK = 1 << 13  # rows of a few numbers, or of some dozens
 _LOCK = Lock()
 _limits: list[Any] = []  # of the threads of BLAS: the same one for each pool that is open
+_opened = local()  # how many threads the pool has that a thread has open, and that pool
 
 
 def blocks(count: int, size: int) -> list[slice]:
@@ -53,9 +54,20 @@ def one_blas_thread() -> Iterator[None]:
 
 @contextmanager
 def workers(most: int | None = None) -> Iterator[ThreadPoolExecutor]:
-    """Open a pool of a thread for each core, or of fewer, while BLAS has one."""
-    with one_blas_thread(), ThreadPoolExecutor(min(cores(), most or cores())) as pool:
-        yield pool
+    """Open a pool of a thread for each core, or of fewer, while BLAS has one: to start threads takes a while.
+
+    Within it, the same thread gets the same pool again. Others, such as those of the pool, open their own.
+    """
+    count, before = min(cores(), most or cores()), getattr(_opened, "pool", None)
+    if before and before[0] == count:
+        yield before[1]
+        return
+    with one_blas_thread(), ThreadPoolExecutor(count) as pool:
+        _opened.pool = count, pool
+        try:
+            yield pool
+        finally:
+            _opened.pool = before
 
 
 def _one_thread() -> Any:
@@ -94,10 +106,16 @@ def on_all_cores(
     if len(parts) < 2:
         return [function(part) for part in parts]
     results = []
-    with workers(min(most or len(parts), len(parts))) as pool:
-        for result in pool.map(function, parts):
-            results.append(result)
-            report()
+    with workers(most) as pool:
+        running = [pool.submit(function, part) for part in parts]
+        try:
+            for future in running:
+                results.append(future.result())
+                report()
+        finally:
+            for future in running:
+                future.cancel()
+            wait(running)
     return results
 
 

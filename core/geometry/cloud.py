@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..algebra import one_blas_thread
+from ..algebra import workers
 from ..errors import ComponentError, TooFewPointsError
 from ..frozen import Frozen
 from ..options import LaplacianOptions, check_options
@@ -93,7 +93,7 @@ class Cloud:
     notices: list[str]  # texts for the user
 
 
-@one_blas_thread()
+@workers()
 def read_cloud(
     points: ArrayLike,
     options: LaplacianOptions,

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from ..algebra import one_blas_thread
+from ..algebra import workers
 from ..arguments import check_switches, positive
 from ..errors import InvalidPointsError
 from ..frozen import Frozen
@@ -386,7 +386,7 @@ class LaplaceBeltrami(Frozen):
 
 
 @ends_at_one
-@one_blas_thread()
+@workers()
 def build_laplacian(
     points: ArrayLike,
     normals: ArrayLike | None = None,

@@ -1,3 +1,5 @@
+import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -45,6 +47,40 @@ def test_no_further_part_is_begun_after_a_cancel():
     with pytest.raises(core.Cancelled):
         on_all_cores(begun.append, range(10_000), report)
     assert len(begun) < 10_000
+
+
+def test_a_thread_keeps_its_pool_and_parts_may_have_parts(monkeypatch):
+    monkeypatch.setenv("MESHFREE_CORES", "2")
+    threads = set()
+
+    def part(number):
+        threads.add(threading.get_ident())
+        return sum(on_all_cores(lambda other: number * other, range(4)))
+
+    with workers() as pool, workers() as again:
+        assert again is pool
+        for _ in range(5):
+            assert on_all_cores(part, range(4)) == [0, 6, 12, 18]
+    assert len(threads) <= 2
+    with workers() as other:
+        assert other is not pool
+
+
+def test_no_part_runs_any_more_after_an_error(monkeypatch):
+    monkeypatch.setenv("MESHFREE_CORES", "2")
+    running = []
+
+    def part(number):
+        running.append(number)
+        time.sleep(0.05 * number)
+        if number == 0:
+            raise ValueError
+        running.remove(number)
+
+    with workers():
+        with pytest.raises(ValueError):
+            on_all_cores(part, range(4))
+        assert running == [0]
 
 
 def test_an_error_of_a_part_comes_through():
