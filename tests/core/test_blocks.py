@@ -74,11 +74,11 @@ def test_no_part_runs_any_more_after_an_error(monkeypatch):
         running.append(number)
         time.sleep(0.05 * number)
         if number == 0:
-            raise ValueError
+            raise ValueError("of the first part")
         running.remove(number)
 
     with workers():
-        with pytest.raises(ValueError):
+        with pytest.raises(ValueError, match="of the first part"):
             on_all_cores(part, range(4))
         assert running == [0]
 
