@@ -113,7 +113,7 @@ def on_all_cores(
                 results.append(future.result())
                 report()
         finally:
-            for future in running:
+            for future in reversed(running):  # before the others get there
                 future.cancel()
             wait(running)
     return results
