@@ -2,6 +2,7 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -46,9 +47,9 @@ class Level:
     restriction: Rows
     known: Known | None = None
 
-    def weighed(self, vectors: Array) -> Array:
+    def weighed(self, vectors: Array) -> Any:
         """Return the product of vectors, (n, k), with the mass."""
-        return vectors if self.mass is None else self.mass.product(vectors, lambda rows, values: None)
+        return vectors if self.mass is None else self.mass @ vectors
 
 
 def build_levels(

@@ -76,8 +76,7 @@ class Pairs:
     @functools.cached_property
     def _joined(self) -> sparse.csr_array:
         """The matrix, (m, sums), that adds at each point what patches summed over first, and over second, points."""
-        places = [rows.astype(np.int32) for patch in self.patches for rows in (patch.rows, patch.columns)]
-        place = np.concatenate(places)
+        place = np.concatenate([end.astype(np.int32) for patch in self.patches for end in (patch.rows, patch.columns)])
         start = np.arange(len(place) + 1, dtype=np.int32)
         return sparse.csc_array((np.ones(len(place)), place, start), shape=(len(self.points), len(place))).tocsr()
 

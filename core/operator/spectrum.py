@@ -119,7 +119,11 @@ def solve_spectrum(
 
     signs = np.array(on_all_cores(first_large, parts))
     sign = signs[(signs != 0.0).argmax(axis=0), np.arange(count)]
-    on_all_cores(lambda rows: result.__setitem__(order[rows], vectors[rows] * sign), parts)
+
+    def put(rows: slice) -> None:
+        result[order[rows]] = vectors[rows] * sign
+
+    on_all_cores(put, parts)
     return Spectrum(unit * np.maximum(values, 0.0), result, residuals)
 
 

@@ -49,8 +49,8 @@ def test_no_further_part_is_begun_after_a_cancel():
         time.sleep(1e-3)
 
     with pytest.raises(core.Cancelled):
-        on_all_cores(part, range(1000), report)
-    assert len(begun) < 1000
+        on_all_cores(part, range(10_000), report)
+    assert len(begun) < 10_000
 
 
 def test_a_thread_keeps_its_pool_and_parts_may_have_parts(monkeypatch):
