@@ -184,13 +184,19 @@ class Window:
                 raise WindowError(f"Blender gives no answer for {seconds} s to: {code}")
             received = os.read(self._answers, 1 << 20)
             if not received:
-                raise WindowError(f"Blender has ended:\n{self.log.read_text(errors='replace')[-3000:]}")
+                raise WindowError(f"Blender has ended:\n{self._last_words()}")
             self._buffer += received
         line, self._buffer = self._buffer.split(b"\n", 1)
         answer = json.loads(line)
         if "error" in answer:
             raise WindowError(answer["error"])
         return answer["value"]
+
+    def _last_words(self):
+        """Read the end of Blender's output, and where it crashed."""
+        self._blender.wait(DRAWING)  # it writes that down first
+        texts = [self.log.read_text(errors="replace")[-3000:]]
+        return "\n".join(texts + [path.read_text(errors="replace") for path in self.folder.glob("*.crash.txt")])
 
     def settle(self):
         """Let Blender see the keys and moves that were sent, and draw, which takes long when shaders are compiled."""
