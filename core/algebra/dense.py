@@ -1,10 +1,10 @@
-"""Dense matrices: products by scipy's BLAS, as numpy may be built without a fast one; inverses of many small ones."""
+"""Dense matrices: products by scipy's BLAS, as numpy may be built without a fast one; factors; many small inverses."""
 
 from ctypes import CFUNCTYPE, byref, c_char_p, c_double, c_float, c_int64, c_void_p, py_object, pythonapi
 from typing import Any
 
 import numpy as np
-from scipy.linalg import cython_blas
+from scipy.linalg import cython_blas, cython_lapack
 
 from ..types import Array, Floats
 from .blocks import blocks, on_all_cores
@@ -31,32 +31,53 @@ def product(left: Array, right: Array) -> Array:
 
 
 def subtract_product(result: Array, left: Array, right: Array) -> None:
-    """Compute ``result -= left @ right`` in place, (m, n), on all cores."""
+    """Compute ``result -= left @ right`` in place, (m, n), on all cores; see `subtract`."""
 
-    def subtract(rows: slice) -> None:
-        result[rows] -= multiply(left[rows], right)
+    def reduce(rows: slice) -> None:
+        subtract(result[rows], left[rows], right)
 
-    on_all_cores(subtract, blocks(len(left), max(1, _WORK // max(1, right.size))))
+    on_all_cores(reduce, blocks(len(left), max(1, _WORK // max(1, right.size))))
+
+
+def subtract(result: Array, left: Array, right: Array) -> None:
+    """Compute ``result -= left @ right`` in place, (m, n), by one call of BLAS; the rows of the result are contiguous.
+
+    Products have the precision of the result.
+    """
+    (m, n), (row, column) = result.shape, result.strides
+    if (n > 1 and column != result.itemsize) or (m > 1 and row < n * result.itemsize):  # BLAS would write elsewhere
+        raise ValueError("The rows of a matrix to subtract from are not contiguous.")
+    _multiply(left, right, result, -1.0, 1.0)
 
 
 def multiply(left: Array, right: Array) -> Array:
     """Return ``left @ right`` of two matrices, (m, k) and (k, n), by one call of BLAS.
 
-    The result has the lower precision of the two. BLAS takes columns, and numpy has rows: it computes the transpose, as
-    the product of the transposes.
+    The result has the lower precision of the two.
     """
-    (m, k), (rows, n), dtype = left.shape, right.shape, _lower(left, right)
-    if rows != k:  # BLAS would read what is beyond
-        raise ValueError(f"Matrices of the shapes {left.shape} and {right.shape} have no product.")
-    result, (gemm, number) = np.zeros((m, n), dtype=dtype), _GEMM[dtype.char]
+    result = np.zeros((len(left), right.shape[1]), dtype=_lower(left, right))
+    _multiply(left, right, result, 1.0, 0.0)
+    return result
+
+
+def _multiply(left: Array, right: Array, result: Array, factor: float, kept: float) -> None:
+    """Compute ``result = factor left @ right + kept result`` in place.
+
+    BLAS takes columns, and numpy has rows: it computes the transpose, as the product of the transposes.
+    """
+    (m, k), (rows, n), dtype = left.shape, right.shape, result.dtype
+    if rows != k or result.shape != (m, n):  # BLAS would read, or write, what is beyond
+        shapes = f"{left.shape} and {right.shape} have no product of the shape {result.shape}"
+        raise ValueError(f"Matrices of the shapes {shapes}.")
     if m * k * n:
+        gemm, number = _GEMM[dtype.char]
         (right, flip_a, step_a), (left, flip_b, step_b) = (
             _in_columns(part.astype(dtype, copy=False)) for part in (right, left)
         )
-        sizes, (one, none) = [byref(c_int64(size)) for size in (n, m, k)], (byref(number(x)) for x in (1.0, 0.0))
+        sizes, (one, other) = [byref(c_int64(size)) for size in (n, m, k)], (byref(number(x)) for x in (factor, kept))
         a, b, c = (array.ctypes.data for array in (right, left, result))
-        gemm(flip_a, flip_b, *sizes, one, a, step_a, b, step_b, none, c, sizes[0])
-    return result
+        step = byref(c_int64(max(result.strides[0] // result.itemsize, n)))  # anything for a single row
+        gemm(flip_a, flip_b, *sizes, one, a, step_a, b, step_b, other, c, step)
 
 
 def _lower(left: Array, right: Array) -> Any:
@@ -74,18 +95,34 @@ def _in_columns(matrix: Array) -> tuple[Array, bytes, Any]:
     return matrix, b"N", byref(c_int64(matrix.strides[0] // matrix.itemsize))
 
 
-def _routine(name: str) -> Any:
-    """Return a routine of scipy's BLAS that lets other threads run: those of `scipy.linalg.blas` hold Python's lock.
+def invert_factor(matrix: Floats) -> bool:
+    """Replace a symmetric matrix, (k, k), by the inverse of its upper Cholesky factor, in place.
+
+    Only its upper triangle is read; its rows are contiguous. The result is upper, with zeros below: it times its
+    transpose is the inverse of the matrix. False is returned, with no sound result, if that is not positive definite.
+    """
+    size, step, failed = c_int64(len(matrix)), c_int64(matrix.strides[0] // matrix.itemsize), c_int64(0)
+    for routine, words in ((_POTRF, (b"L",)), (_TRTRI, (b"L", b"N"))):  # of columns, which the rows are to LAPACK
+        routine(*words, byref(size), matrix.ctypes.data, byref(step), byref(failed))
+        if failed.value:
+            return False
+    matrix[np.tri(len(matrix), k=-1, dtype=bool)] = 0.0
+    return True
+
+
+def _routine(library: Any, name: str, arguments: int) -> Any:
+    """Return a routine of scipy's BLAS or LAPACK that lets other threads run: others of scipy hold Python's lock.
 
     Its whole numbers have 32 bits, or 64: of small positive ones the former are the first half of the latter.
     """
-    capsule = cython_blas.__pyx_capi__[name]
+    capsule = library.__pyx_capi__[name]
     signature = CFUNCTYPE(c_char_p, py_object)(("PyCapsule_GetName", pythonapi))(capsule)
     address = CFUNCTYPE(c_void_p, py_object, c_char_p)(("PyCapsule_GetPointer", pythonapi))(capsule, signature)
-    return CFUNCTYPE(None, *[c_void_p] * 13)(address)
+    return CFUNCTYPE(None, *[c_void_p] * arguments)(address)
 
 
-_GEMM = {"f": (_routine("sgemm"), c_float), "d": (_routine("dgemm"), c_double)}
+_GEMM = {"f": (_routine(cython_blas, "sgemm", 13), c_float), "d": (_routine(cython_blas, "dgemm", 13), c_double)}
+_POTRF, _TRTRI = _routine(cython_lapack, "dpotrf", 5), _routine(cython_lapack, "dtrtri", 6)
 
 
 def inverses(matrices: Floats) -> Floats:

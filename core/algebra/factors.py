@@ -42,19 +42,26 @@ def dissect(matrix: sparse.sparray, points: Floats, report: Report = lambda: Non
         own = part[rows]
         size = np.bincount(own)
         if not len(rows) or size.max() <= _LEAF:
-            order = np.lexsort((points[:, 0], place))
-            return order, np.flatnonzero(np.diff(place[order], prepend=-1))
-        rank = _ranks_along(points[rows], own, size)
+            # In each part along its longest axis: what is coupled with it are few stretches of others.
+            part = np.unique(place, return_inverse=True)[1].reshape(-1)
+            order = np.lexsort((_ranks_along(points, part, np.bincount(part)), part))
+            return order, np.flatnonzero(np.diff(part[order], prepend=-1))
+        # How far along its part each point is, as a share; of parts that are divided no further no share is reached.
+        along = np.zeros(count)
+        along[rows] = np.where(size[own] > _LEAF, _ranks_along(points[rows], own, size) / size[own], 0.0)
         least = np.full(len(size), np.inf)
         side, cut = np.zeros(count, dtype=np.int8), np.zeros(count, dtype=bool)
+        ends = along[first], along[second]
+        cuttable = (np.maximum(*ends) >= _SHARES[0]) & (np.minimum(*ends) < _SHARES[-1])
+        left, right = first[cuttable], second[cuttable]
         for share in _SHARES:
-            beyond = np.zeros(count, dtype=np.int8)
-            beyond[rows] = (rank >= share * size[own]) & (size[own] > _LEAF)
-            step = beyond[second] - beyond[first]
-            for ends in ((first[step > 0], second[step < 0]), (second[step > 0], first[step < 0])):
+            beyond = along >= share
+            crossing = beyond[left] != beyond[right]
+            one, other = left[crossing], right[crossing]
+            swapped = beyond[one]
+            for end in (np.where(swapped, other, one), np.where(swapped, one, other)):
                 border = np.zeros(count, dtype=bool)
-                for end in ends:
-                    border[end] = True
+                border[end] = True
                 length = np.bincount(own, border[rows], minlength=len(size))
                 better = length < least
                 least[better] = length[better]

@@ -76,6 +76,44 @@ def test_a_product_is_subtracted_in_place(monkeypatch, dtype, work):
     np.testing.assert_allclose(result, expected, rtol=0, atol=100.0 * np.finfo(dtype).eps)
 
 
+def test_a_product_is_subtracted_from_part_of_a_matrix():
+    rng = np.random.default_rng(0)
+    whole, left, right = rng.standard_normal((9, 8)), rng.standard_normal((2, 5)), rng.standard_normal((5, 3))
+    expected = whole.copy()
+    expected[3:5, 4:7] -= left @ right
+    dense.subtract(whole[3:5, 4:7], left, right)
+    np.testing.assert_allclose(whole, expected, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("part", [lambda matrix: matrix.T, lambda matrix: matrix[:, ::2], lambda matrix: matrix[::-1]])
+def test_a_product_is_not_subtracted_where_blas_would_write_elsewhere(part):
+    whole = np.zeros((6, 6))
+    target = part(whole)
+    with pytest.raises(ValueError, match="not contiguous"):
+        dense.subtract(target, np.ones((len(target), 2)), np.ones((2, target.shape[1])))
+    with pytest.raises(ValueError, match=r"no product of the shape \(6, 6\)"):
+        dense.subtract(whole, np.ones((5, 2)), np.ones((2, 6)))
+    assert not whole.any()
+
+
+@pytest.mark.parametrize("size", [1, 2, 7, 300])
+def test_inverse_of_a_factor(size):
+    half = np.random.default_rng(0).standard_normal((size, size + 4))
+    matrix = half @ half.T
+    wide = np.full((size, size + 3), 7.0)
+    wide[:, :size] = np.triu(matrix) + np.tril(np.full((size, size), np.nan), -1)  # which is not read
+    assert dense.invert_factor(wide[:, :size])
+    found = wide[:, :size]
+    np.testing.assert_array_equal(found, np.triu(found))
+    np.testing.assert_allclose(found @ found.T @ matrix, np.eye(size), atol=1e-8)
+    assert (wide[:, size:] == 7.0).all()
+
+
+@pytest.mark.parametrize("least", [-1e-6, -1.0])
+def test_a_matrix_that_is_not_positive_definite_has_no_factor(least):
+    assert not dense.invert_factor(np.diag([1.0, 2.0, least, 3.0]))
+
+
 @pytest.mark.parametrize("size", [1, 3, 6])
 def test_inverses_of_many_small_matrices(monkeypatch, size):
     monkeypatch.setattr(dense, "_BLOCK", 7)

@@ -92,6 +92,28 @@ def test_factors_solve_the_equations(points, reach, shape, monkeypatch):
     np.testing.assert_array_equal(right, given)
 
 
+def test_factors_are_the_same_on_any_number_of_cores(monkeypatch):
+    points = square(2000)
+    matrix = near_matrix(points, 0.07)
+    order, starts = dissect(matrix, points)
+    found = []
+    for count in (1, 2):
+        monkeypatch.setenv("MESHFREE_CORES", str(count))
+        found.append(factorize(matrix[order][:, order], starts)(points))
+    np.testing.assert_array_equal(*found)
+
+
+def test_points_of_a_part_follow_each_other_along_its_longest_axis():
+    points = square(1500)
+    order, starts = dissect(near_matrix(points, 0.13), points)
+    parts = [part for part in np.split(points[order], starts[1:]) if len(part) > 1]
+    for part in parts:
+        offset = part - part.mean(axis=0)
+        steps = np.diff(offset @ np.linalg.eigh(offset.T @ offset)[1][:, -1])
+        assert (steps > 0.0).all() or (steps < 0.0).all()
+    assert len(parts) > 10
+
+
 def test_equations_without_a_single_solution_are_refused():
     points = square(300)
     matrix = near_matrix(points, 0.2) - sparse.diags_array(np.full(300, 1.0 + 1e-6))
