@@ -8,7 +8,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from ..algebra import TRACE, Anderson, blocks, dissect, factorize, nearest_rotations, rotations_in_groups, sparsify
+from ..algebra import (
+    TRACE,
+    Anderson,
+    blocks,
+    dissect,
+    factorize,
+    nearest_rotations,
+    on_all_cores,
+    rotations_in_groups,
+    sparsify,
+)
 from ..arguments import as_doubles, check_array, check_positions, check_switches, real, whole
 from ..errors import PointCloudError
 from ..geometry import as_indices
@@ -465,8 +475,6 @@ def _check_steps(steps: int, rtol: float) -> tuple[int, float]:
 
 def _energy(stiffness: sparse.csr_array, inverse: sparse.csr_array, report: Callable[[], None]) -> sparse.csr_array:
     """Return K M^-1 K, computed in blocks of rows, each in a fraction of a second."""
-    weighted, products = (stiffness @ inverse).tocsr(), []
-    for rows in blocks(len(inverse.diagonal()), _BLOCK):
-        report()
-        products.append(weighted[rows] @ stiffness)
+    weighted = (stiffness @ inverse).tocsr()
+    products = on_all_cores(lambda rows: weighted[rows] @ stiffness, blocks(weighted.shape[0], _BLOCK), report)
     return sparse.vstack(products, format="csr")

@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from ..algebra import lifted_inverse, rotations_in_groups
+from ..algebra import by_blocks, lifted_inverse, rotations_in_groups
 from ..arguments import check_positions
 from ..geometry import frames
 from ..operator import LaplaceBeltrami
@@ -120,10 +120,16 @@ def coupled(laplacian: LaplaceBeltrami) -> Bools:
     the squared distance is four. Points where that sum is far smaller, such as single ones far off the surface, belong
     to a component by name only.
     """
-    pairs = laplacian.stiffness.tocoo()
-    step = laplacian.points[pairs.row] - laplacian.points[pairs.col]
-    weight = np.maximum(-pairs.data, 0.0) * np.einsum("ka,ka->k", step, step)
-    sums = np.bincount(pairs.row, weight, minlength=len(laplacian.points))
+    points, stiffness = laplacian.points, laplacian.stiffness
+
+    def weigh(rows: slice) -> Floats:
+        part, count = stiffness[rows], rows.stop - rows.start
+        row = np.repeat(np.arange(count), np.diff(part.indptr))
+        step = points[part.indices] - points[rows][row]
+        weight = np.maximum(-part.data, 0.0) * np.einsum("ka,ka->k", step, step)
+        return np.asarray(np.bincount(row, weight, minlength=count), dtype=np.float64)
+
+    sums = by_blocks(weigh, len(points))
     return (laplacian.component >= 0) & (sums > _FAINT * 4.0 * laplacian.areas)
 
 
