@@ -50,7 +50,7 @@ COSTLY = {  # where each is called from
     "core.surface": ("surface_discs", "values_on_mesh"),
     "core.surface.meshing": ("_mesh",),
     "core.operator.laplacian": ("build_laplacian",),
-    "core.algebra.cholesky": ("dpotrf",),
+    "core.algebra.cholesky": ("invert_factor",),
     "core.algebra.solvers": ("conjugate_gradients",),
     "core.operator.spectrum": ("coarse_to_fine", "lift_lowest"),
     "core.algebra.eigenvalue": ("eigsh",),
