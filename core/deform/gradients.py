@@ -120,7 +120,7 @@ def coupled(laplacian: LaplaceBeltrami) -> Bools:
     the squared distance is four. Points where that sum is far smaller, such as single ones far off the surface, belong
     to a component by name only.
     """
-    points, stiffness = laplacian.points, laplacian.stiffness
+    points, stiffness = laplacian.surface_points, laplacian.stiffness
 
     def weigh(rows: slice) -> Floats:
         part, count = stiffness[rows], rows.stop - rows.start

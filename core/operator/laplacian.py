@@ -539,8 +539,8 @@ def narrow_laplacian(
     """Build an operator with few neighbors on the same points, to be factorised, or on some of them.
 
     Neighbors are those inside the kernel's support. It is less accurate for functions, but sharp at fixed points, and
-    with small factors. Normals, boundary and `surface_points` are those of the given one, which is returned if it is as
-    narrow already. Of `rows`, (k,) int, components do not join those of the given operator.
+    with small factors. Points, normals, boundary and `surface_points` are those of the given one, which is returned if
+    it is as narrow already. Of `rows`, (k,) int, components do not join those of the given operator.
     """
     options = replace(
         laplacian.options,
@@ -554,7 +554,8 @@ def narrow_laplacian(
         if laplacian.options == options:
             return laplacian
         left_out = laplacian.component < 0
-        return build_laplacian(points, normals, options, boundary=boundary, left_out=left_out, progress=progress)
+        built = build_laplacian(points, normals, options, boundary=boundary, left_out=left_out, progress=progress)
+        return replace(built, points=laplacian.points)
     apart = move_apart(points[rows], laplacian.component[rows])
     built = build_laplacian(apart, normals[rows], options, boundary=boundary[rows], progress=progress)
     return replace(built, points=laplacian.points[rows], surface_points=points[rows])

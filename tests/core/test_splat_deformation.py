@@ -58,6 +58,16 @@ def test_gradients_of_similarities_are_these():
             np.testing.assert_allclose(found, np.tile(scale * TURN, (len(points), 1, 1)), atol=1e-10 * scale)
 
 
+def test_noise_that_the_operator_smooths_leaves_gradients_of_a_turn_exact():
+    rng = np.random.default_rng(0)
+    points = random_sphere(1500) * rng.normal(1.0, 0.02, (1500, 1))
+    laplacian = core.build_laplacian(points)
+    assert np.abs(laplacian.surface_points - points).max() > 0.01
+    low, high = np.flatnonzero(points[:, 2] < -0.8), np.flatnonzero(points[:, 2] > 0.8)
+    found = core.deform.Deformer(laplacian, high, low).gradients(points @ TURN.T + 2.0)
+    np.testing.assert_allclose(found, np.broadcast_to(TURN, found.shape), atol=1e-9)
+
+
 def test_gradients_of_linear_maps_are_these_along_the_surface():
     linear = np.array([[1.3, 0.2, 0.0], [0.0, 0.8, 0.3], [0.1, 0.0, 1.1]])
     errors = []
