@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from ..errors import SolverError
-from ..types import Bools, Floats, Ints
+from ..types import Floats, Ints
 from .blocks import blocks, on_all_cores, workers
 from .dense import invert_factor, multiply, subtract
 
@@ -67,7 +67,7 @@ def factorize(
             fronts.eliminate(number, _in_turn)
 
     def tell() -> None:
-        report(float(work @ fronts.done / work.sum()))
+        report(float(work @ [part is not None for part in fronts.parts] / work.sum()))
 
     with workers():
         on_all_cores(eliminate, branches, tell)
@@ -94,8 +94,7 @@ class _Fronts:
             self._children[parent[number]].append(int(number))
         self._left: dict[int, Floats] = {}  # by parts whose next one is to come: their Schur complements
         self._space = _Space()
-        self.parts: list[Any] = [None] * len(bounds)  # of `Factors`
-        self.done: Bools = np.zeros(len(bounds), dtype=bool)
+        self.parts: list[Any] = [None] * len(bounds)  # of `Factors`, once they are eliminated
 
     def eliminate(self, number: int, each: _Each) -> None:
         """Eliminate the unknowns of a part, those before which are eliminated."""
@@ -129,7 +128,7 @@ class _Fronts:
         each(divide, columns)
         each(reduce, columns)
         self._space.give(below)
-        self._left[number], self.parts[number], self.done[number] = left, part, True
+        self._left[number], self.parts[number] = left, part
 
 
 class _Space:
