@@ -553,8 +553,17 @@ def narrow_laplacian(
     if rows is None:
         if laplacian.options == options:
             return laplacian
-        left_out = laplacian.component < 0
-        built = build_laplacian(points, normals, options, boundary=boundary, left_out=left_out, progress=progress)
+        # What was decided for these points stands; they are not rounded any more, and other pairs need other bridges.
+        agreed = replace(laplacian.agreed, rounded=np.zeros(3), bridges=None, length=None, ratio=None)
+        built = build_laplacian(
+            points,
+            normals,
+            options,
+            boundary=boundary,
+            left_out=laplacian.component < 0,
+            agreed=agreed,
+            progress=progress,
+        )
         return replace(built, points=laplacian.points)
     apart = move_apart(points[rows], laplacian.component[rows])
     built = build_laplacian(apart, normals[rows], options, boundary=boundary[rows], progress=progress)

@@ -1,10 +1,13 @@
 """Points that the caller leaves out of the operator."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
 import core
+from core.geometry import cloud
 from core.operator import narrow_laplacian
 
 
@@ -68,6 +71,23 @@ def test_uses_of_the_operator_know_points_left_out():
     np.testing.assert_allclose(distance, core.distance.geodesic_distance(alone, [0]), rtol=1e-6, atol=1e-9)
     narrow = narrow_laplacian(part)
     assert (narrow.component[out] == -1).all()
+
+
+def test_a_narrow_operator_takes_what_was_decided_for_its_points(monkeypatch):
+    points, out = some_points()
+    wide = core.build_laplacian(points, left_out=out)
+    usual = narrow_laplacian(replace(wide, agreed=core.Agreed()))
+
+    def decided(*_):
+        raise AssertionError("decided again")
+
+    for name in ("label_components", "label_sheets", "orient_by_winding"):
+        monkeypatch.setattr(cloud, name, decided)
+    narrow = narrow_laplacian(wide)
+    assert_array_equal(narrow.component, usual.component)
+    np.testing.assert_allclose(narrow.normals, wide.normals, atol=1e-12)
+    np.testing.assert_allclose(narrow.areas, usual.areas, rtol=1e-9)
+    assert abs(narrow.stiffness - usual.stiffness).max() < 1e-9 * abs(usual.stiffness).max()
 
 
 def test_all_points_left_out_and_wrong_sets_are_refused():
