@@ -16,7 +16,7 @@ from .nearest import COUNT, Nearest
 from .quadrics import CURVED, along, chords, components, frames, lengthened
 from .sheets import on_sheet
 
-_BLOCK = 1 << 12
+_BLOCK = 1 << 13  # points whose cells are cut at one time
 _SAME = 1e-9  # relative tolerance: cuts that differ by less of the longest one, or of their product, are the same
 _AT_BOUNDARY = 1e-3  # spacings that a boundary lies off a point, at least
 _CLOSEST = 1e-6  # spacings to the nearest cut, at least: its inverse is so long that `_SAME` would hide other cuts

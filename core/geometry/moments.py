@@ -19,7 +19,7 @@ _MOST = 160  # neighbors in a kernel, at most, that are looked at: with more, an
 LARGEST = 2.0  # change of a weight's logarithm, at most: where more is needed the moments cannot be met
 _STEPS = 8  # of Newton's method
 MET = 2e-3  # relative residual of the moments that is small enough; the ridge of their equations, too
-_BLOCK = 1 << 12
+_BLOCK = 1 << 13  # points worked on at one time: of fewer, cores wait for each other
 
 
 class EdgeTerms:

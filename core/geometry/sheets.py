@@ -23,7 +23,7 @@ from .quadrics import Quadrics, along, chords, eighths, fit_quadrics, in_plane
 
 _LEANING = 0.1  # error of the normals: heights may be off by this share of the distance
 _SEEDS = 9  # nearest neighbors, every two of which span a candidate plane with the point
-_BLOCK = 1 << 10
+_BLOCK = 1 << 11  # points worked on at one time: of fewer, cores wait for each other
 _AROUND = 1.6  # path along a sheet over the chord, at most: 1.41 across a right angle, in steps that zigzag by an
 # eighth; points that many spacings apart touch
 _NEARBY, _SOURCES = 1 << 8, 1 << 5  # points that share a neighborhood; of them, from which paths are followed at once

@@ -18,7 +18,7 @@ _PATCHES = 200  # that a surface is divided into at most
 _CLUMPS = 1500  # of points, each a dipole; pairs of them are summed in blocks
 _FINE = 32_000  # clumps that stand for the points where they are near, so that close sheets are separated
 _NEAR = 3.0  # sizes of a clump
-_BLOCK = 1 << 15  # pairs of dipoles taken at one time: of more, and memory is asked of the system again and again
+_BLOCK = 1 << 17  # pairs of dipoles taken at one time: of fewer, cores wait for each other
 _COUPLED = 0.1  # common energy over the size of the smaller of two groups of patches that have one outside
 _SAMPLE = 2000  # points whose spacing gives the median one
 
