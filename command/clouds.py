@@ -190,7 +190,7 @@ def moved(given: Given, points: Array, matrix: Array, place: Array) -> Given:
     if isinstance(given, core.splats.Splats):
         return given.deformed(after, np.broadcast_to(linear, (len(after), 3, 3)))
     columns = dict(given.attributes)
-    turn = (linear / np.cbrt(np.linalg.det(linear))).T
+    turn = (linear / np.linalg.norm(linear[0])).T
     for name, values in columns.items():
         if np.ndim(values) == 2 and (
             name in (_FILE_NORMAL, quantities.ORIENTATION) or quantities.quantity(name).is_direction

@@ -47,7 +47,7 @@ class AlignPoints(PointTool):
     def finish(self, found: Any, points: Array, own: Any, length: Length) -> Outcome:
         found, other = found
         middle = float(np.quantile(found.residual, 0.5 * found.overlap))  # of the points that have a counterpart
-        size = f", scaled by {np.cbrt(np.linalg.det(found.matrix[:3, :3])):.4g}" if own.scale else ""
+        size = f", scaled by {np.linalg.norm(found.matrix[0, :3]):.4g}" if own.scale else ""
         half = f"half of them within {length(middle)}"
         line = f"{found.overlap:.0%} of the points lie on {other.name}, {half}{size}"
         there, back = np.eye(4), np.eye(4)

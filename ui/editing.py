@@ -14,6 +14,7 @@ import gpu
 import numpy as np
 from bpy.app.handlers import persistent
 
+from ..core.linalg import det, pinv
 from ..operators.objects.attributes import DISC, has_vectors, read_attribute
 from ..operators.objects.colors import is_color, own_colors, splat_colors
 from ..operators.objects.handlers import add_handlers, remove_handlers
@@ -282,9 +283,9 @@ def _view(context, obj):
     space, region = context.region_data, context.region
     world, screen = np.array(obj.matrix_world), np.array(space.window_matrix)
     to_view = np.array(space.view_matrix) @ world
-    scale = np.cbrt(abs(np.linalg.det(world[:3, :3])))
+    scale = np.cbrt(abs(det(world[:3, :3])))
     to_normal = np.eye(4)
-    to_normal[:3, :3] = np.linalg.pinv(to_view[:3, :3]).T
+    to_normal[:3, :3] = pinv(to_view[:3, :3]).T
     clip = np.array([[*plane] for plane in space.clip_planes[:4]]) @ world
     theme = context.preferences.themes[0].view_3d
     dot = _DOT * theme.vertex_size * context.preferences.system.pixel_size / np.sqrt(2.0)

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..linalg import solve
 from ..types import Floats
 
 _MEMORY = 5  # previous steps that the next one is extrapolated from
@@ -40,7 +41,7 @@ class Anderson:
         if not products.any():
             return ()
         products += self._smallest * np.trace(products) * np.eye(len(products))
-        return tuple(np.linalg.solve(products, [_dot(changed, change) for changed in changes]).tolist())
+        return tuple(solve(products, [_dot(changed, change) for changed in changes]).tolist())
 
 
 def _dot(left: Floats, right: Floats) -> float:

@@ -4,6 +4,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
+from ..linalg import eigh
 from ..types import Floats, Ints, Report
 
 _LEAF = 120  # points that are divided no further
@@ -81,7 +82,7 @@ def _ranks_along(points: Floats, part: Ints, size: Ints) -> Ints:
     mean = np.stack([np.bincount(part, values) for values in points.T], axis=1) / size[:, None]
     offset = points - mean[part]
     products = np.stack([np.bincount(part, offset[:, a] * offset[:, b]) for a in range(3) for b in range(3)], axis=1)
-    axis = np.linalg.eigh(products.reshape(-1, 3, 3))[1][:, :, -1]
+    axis = eigh(products.reshape(-1, 3, 3))[1][:, :, -1]
     along = np.einsum("ij,ij->i", offset, axis[part])
     order = np.lexsort((along, part))
     rank = np.empty(len(part), dtype=int)

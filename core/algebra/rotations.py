@@ -3,6 +3,7 @@
 import numpy as np
 from scipy import sparse
 
+from ..linalg import det, svd
 from ..types import Floats, Ints
 
 _STEPS = 12  # of Newton's method; seven reach full precision for singular values within 1 : 20
@@ -88,7 +89,7 @@ def _cofactors(x: Floats) -> Floats:
 def _decompose(matrices: Floats) -> Floats:
     """Find the same rotations by singular value decompositions; zero matrices count as the identity."""
     # A hint of the identity decides where the rotation about some axis is free.
-    left, _, right = np.linalg.svd(matrices + 1e-14 * np.eye(3))
-    sign = np.linalg.det(left) * np.linalg.det(right)
+    left, _, right = svd(matrices + 1e-14 * np.eye(3))
+    sign = det(left) * det(right)
     left[:, :, 2] *= np.sign(sign)[:, None]
     return np.moveaxis(left @ right, 0, 2)

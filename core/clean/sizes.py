@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import PointCloudError, SolverError
+from ..linalg import eigh
 from ..operator import LaplaceBeltrami
 from ..types import Array, Bools, Floats
 
@@ -55,7 +56,7 @@ class SurfaceSize:
         flat = x[:, a] * products[:, b] + x[:, b] * products[:, a] - products[:, 3:]
         flat = flat[known] / (2.0 * laplacian.areas[known])[:, None]
         metric = flat[:, [0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(-1, 3, 3)
-        values, vectors = np.linalg.eigh(metric)
+        values, vectors = eigh(metric)
         normals = vectors[:, :, 0]
         side = np.where(np.einsum("ic,ic->i", normals, laplacian.normals[known]) < 0.0, -1.0, 1.0)
         return np.sqrt(np.maximum(values[:, 1] * values[:, 2], 0.0)) * self.factor, side[:, None] * normals

@@ -10,6 +10,7 @@ from ..arguments import check_switches, real, whole
 from ..cores import cores
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import NEIGHBORS, apart, check_points, nearest_in_blocks
+from ..linalg import eigvalsh
 from ..progress import ends_at_one
 from ..types import Floats, Ints, Progress, Report
 
@@ -107,7 +108,7 @@ def _measure(points: Floats, report: Report) -> tuple[float, Floats]:
         last = min(_SPACING, index.shape[1] - 1)
         area += np.sum(np.pi / max(last, 1) * distance[:, last] ** 2)
         offset = points[index] - points[index].mean(axis=1, keepdims=True)
-        spread = np.linalg.eigvalsh(np.swapaxes(offset, 1, 2) @ offset)
+        spread = eigvalsh(np.swapaxes(offset, 1, 2) @ offset)
         variation[start : start + len(index)] = np.clip(spread[:, 0], 0.0, None) / np.maximum(
             spread.sum(axis=1), 1e-300
         )

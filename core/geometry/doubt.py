@@ -5,6 +5,7 @@ from enum import IntEnum
 
 import numpy as np
 
+from ..linalg import eigvalsh
 from ..types import Array, Floats, Ints
 from .cells import Cells
 from .nearest import ON, ROUNDS, Nearest, fading_weights
@@ -89,5 +90,5 @@ def _agreement(nearest: Nearest, normals: Floats) -> Floats:
     everywhere = replace(nearest, weight=fading_weights(nearest.distance))  # over all sheets
     products = np.einsum("ia,ib->iab", normals, normals).reshape(-1, 9)
     products = everywhere.averaged(products, ROUNDS // 2)
-    largest: Array = np.linalg.eigvalsh(products.reshape(-1, 3, 3))[:, 2]
+    largest: Array = eigvalsh(products.reshape(-1, 3, 3))[:, 2]
     return largest

@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from ..algebra import blocks, by_blocks, on_all_cores
 from ..cores import cores
+from ..linalg import eigvalsh
 from ..types import Bools, Floats, Ints
 from .quadrics import Quadrics, chords, covariance, fit_quadrics, roundness
 
@@ -91,7 +92,7 @@ class Nearest:
 
         def lined(part: slice) -> Bools:
             spread = covariance(chords(self.points, rows[part], index[part]), even[part])
-            return roundness(np.linalg.eigvalsh(spread)) < ROW
+            return roundness(eigvalsh(spread)) < ROW
 
         return by_blocks(lined, len(rows))
 

@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 from ..arguments import Shape, as_array, as_doubles, check_array, check_finite
 from ..cores import cores
 from ..errors import InvalidPointsError, NotASurfaceError, TooFewPointsError
+from ..linalg import eigvalsh
 from ..types import Bools, Floats, Ints
 from .agreed import Decisions
 from .scaled import ScaledPoints
@@ -90,7 +91,7 @@ def scale_points(points: Floats, decisions: Decisions | None = None) -> ScaledPo
             f"A surface needs at least {FEWEST_OF_SURFACE} different points, and there are {len(distinct)}{among}."
             " Add points."
         )
-    spread = np.linalg.eigvalsh(distinct.T @ distinct / len(distinct))
+    spread = eigvalsh(distinct.T @ distinct / len(distinct))
     if spread[1] < 1e-10 * spread[2]:
         raise NotASurfaceError(
             f"All {len(points)} points lie on a straight line, so they have no area. Use points of a surface."

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..algebra import blocks, by_blocks, eliminate, on_all_cores
 from ..errors import NotASurfaceError
+from ..linalg import eigh
 from ..types import Array, Floats, Ints
 
 _BLOCK = 1 << 13  # points fitted at one time
@@ -96,7 +97,7 @@ def fit_quadrics(
         share = weight[block] / weight[block].sum(axis=1, keepdims=True)
         spread = covariance(offset, share)
         if normals is None:
-            variance, frame = np.linalg.eigh(spread)
+            variance, frame = eigh(spread)
             fitted.roundness[block] = roundness(variance)
         else:
             frame = frames(normals[block])

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..algebra import blocks, on_all_cores
+from ..linalg import solve
 from ..types import Floats
 from .nearest import COUNT, FEW, NEXT, Nearest, fading_weights, find_nearest, spacing_of
 from .noise import LARGEST
@@ -144,7 +145,7 @@ def smooth_along(nearest: Nearest, rounding: Floats) -> Smoothed:
             sums = np.einsum("ik,nik->in", weight, products)
             equations[:, _PAIRS[0], _PAIRS[1]] = equations[:, _PAIRS[1], _PAIRS[0]] = sums
             equations[:, range(6), range(6)] += _RIDGE
-            fit = np.linalg.solve(equations[:, :6, :6], equations[:, :6, 6:])
+            fit = solve(equations[:, :6, :6], equations[:, :6, 6:])
             off = height - np.einsum("nik,in->ik", basis[:6], fit[:, :, 0])
             wide = np.hypot(cut, _CUT * np.median(np.abs(off), axis=1))
             weight = fading * np.maximum(1.0 - (off / wide[:, None]) ** 2, 1e-6) ** 2

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..cores import cores
+from ..linalg import eigvalsh
 from ..types import Bools, Floats, Ints
 from .boundary import HOLE, PROBE, SURE, VOID
 from .cells import Cells
@@ -119,7 +120,7 @@ def _label(
     mean = np.stack([np.bincount(label, axis) for axis in center.T], axis=1) / members[:, None]
     away = center - mean[label]
     spread = np.stack([np.bincount(label, a * b) for a in away.T for b in away.T], axis=1) / members[:, None]
-    length = 2.0 * np.sqrt(np.maximum(np.linalg.eigvalsh(spread.reshape(-1, 3, 3))[:, 2], 0.0))
+    length = 2.0 * np.sqrt(np.maximum(eigvalsh(spread.reshape(-1, 3, 3))[:, 2], 0.0))
     long = length > _LONG * np.bincount(label, radius) / members
     hole = np.bincount(label, radius / usual) / members > HOLE
     total = np.bincount(label, area)

@@ -9,6 +9,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..algebra import blocks, on_all_cores
+from ..linalg import eigh
 from ..types import Array, Floats, Ints
 from .nearest import Nearest, spacing_of
 from .normals import NEIGHBORS, outer_signs, propagate_signs
@@ -228,7 +229,7 @@ def _least(energy: Floats) -> Floats:
     mutual = energy - np.diag(np.diag(energy))
     mutual = 0.5 * (mutual + mutual.T)
     scale = np.sqrt(np.maximum(np.abs(np.diag(energy)), np.finfo(float).tiny))
-    leading = np.linalg.eigh(mutual / scale / scale[:, None])[1][:, -1]
+    leading = eigh(mutual / scale / scale[:, None])[1][:, -1]
     best, most = np.ones(len(mutual)), -np.inf
     for sign in np.ones(len(mutual)), np.where(leading < 0.0, -1.0, 1.0):
         field = mutual @ sign

@@ -16,6 +16,7 @@ from ..arguments import check_array, check_finite, check_positions, check_switch
 from ..cores import cores
 from ..errors import InvalidPointsError, PointCloudError
 from ..geometry import SMOOTH, check_points, read_surface
+from ..linalg import det, eigh, eigvalsh, inv, svd
 from ..options import LaplacianOptions
 from ..progress import ends_at_one
 from ..types import Array, Bools, Floats, Ints, Progress, Report
@@ -247,7 +248,7 @@ def _ways(places: ArrayLike, others: ArrayLike, spacing: float, scale: bool) -> 
 def _center(places: Floats, count: int) -> Floats:
     """Return the center of places, (k, 3), that determine a rotation."""
     center: Floats = places.mean(axis=0) if count else np.zeros(3)
-    spread = np.linalg.svd(places - center, compute_uv=False) if count > 2 else np.zeros(3)
+    spread = svd(places - center, compute_uv=False) if count > 2 else np.zeros(3)
     if not spread[1] > 1e-6 * spread[0]:
         raise InvalidPointsError(
             f"The {count} pairs of places do not determine a rotation. Give at least three, not on one line."
@@ -258,7 +259,7 @@ def _center(places: Floats, count: int) -> Floats:
 def _check_start(start: ArrayLike) -> Floats:
     matrix = check_array(start, "Starts", [(4, 4)], "Give a matrix of 4 x 4 numbers.").astype(np.float64)
     check_finite(matrix, "rows of the start", "Give a matrix of finite numbers.")
-    size = np.cbrt(np.linalg.det(matrix[:3, :3]))
+    size = np.cbrt(det(matrix[:3, :3]))
     square = matrix[:3, :3].T @ matrix[:3, :3]
     if not (size > 0.0 and np.allclose(square / size**2, np.eye(3), atol=1e-3)) or not np.allclose(
         matrix[3], [0.0, 0.0, 0.0, 1.0]
@@ -365,7 +366,7 @@ class _Search:
         """Yield a start, then others around it, turned and shifted along the axes of the moving surface."""
         yield start
         size = np.linalg.norm(np.ptp(self.moving.places, axis=0))
-        axes = np.linalg.eigh(self.moving.places.T @ self.moving.places)[1].T
+        axes = eigh(self.moving.places.T @ self.moving.places)[1].T
         middle = self.moving.places.mean(axis=0)
         for axis in [*axes, *-axes]:
             yield start @ _shift(middle) @ _linear(_rotation(_TURN * axis)) @ _shift(-middle)
@@ -416,9 +417,9 @@ class _Search:
 
     def matches(self, matrix: Floats, here: Ints | slice = slice(None), there: Ints | slice = slice(None)) -> _Matches:
         """Find the closest places to both surfaces' chosen ones on the other surface."""
-        size = np.cbrt(np.linalg.det(matrix[:3, :3]))
+        size = np.cbrt(det(matrix[:3, :3]))
         places, normals = _apply(matrix, self.moving.places), self.moving.normals @ matrix[:3, :3].T / size
-        back = _apply(np.linalg.inv(matrix), self.fixed.places[there])
+        back = _apply(inv(matrix), self.fixed.places[there])
         forth_distance, forth = _closest(self.fixed.tree, places[here])
         back_distance, back_row = _closest(self.moving.tree, back)
         first = np.concatenate([np.arange(len(places))[here], back_row])
@@ -478,11 +479,11 @@ class _Equations:
         halved = self.matrix.copy()
         halved[:3] *= 0.5  # the rotation is done twice, once to each side
         halved[:, :3] *= 0.5
-        return float(np.linalg.eigvalsh(halved)[0])
+        return float(eigvalsh(halved)[0])
 
     def motion(self) -> Floats:
         """Solve for the motion, (4, 4); what is not determined stays as it is."""
-        values, vectors = np.linalg.eigh(self.matrix)
+        values, vectors = eigh(self.matrix)
         solution = vectors @ ((vectors.T @ self.right_side) / np.maximum(values, 1e-6 * values[-1] + 1e-300))
         turn, shift = solution[:3] / self.size, solution[3:6]
         angle = np.arctan(np.linalg.norm(turn))

@@ -12,6 +12,7 @@ from ..arguments import as_doubles, check_array, check_plane
 from ..errors import InvalidPointsError
 from ..frozen import Frozen
 from ..geometry import as_mask
+from ..linalg import eigh
 from ..operator import LaplaceBeltrami
 from ..types import Bools, Floats, Ints
 from .regions import SurfaceMeasures, measures_of
@@ -194,7 +195,7 @@ def _fitted(rim: Floats, count: int) -> tuple[Floats, Floats]:
             " part of the surface that ends somewhere, or a plane."
         )
     middle = rim.mean(axis=0)
-    axis: Floats = np.linalg.eigh((rim - middle).T @ (rim - middle))[1][:, 0]
+    axis: Floats = eigh((rim - middle).T @ (rim - middle))[1][:, 0]
     return middle, axis
 
 

@@ -17,6 +17,7 @@ from ..arguments import as_array, check_array, check_finite
 from ..errors import InvalidPointsError
 from ..frozen import Frozen
 from ..geometry import FEW, SMOOTH, as_mask, move_apart
+from ..linalg import solve
 from ..operator import LaplaceBeltrami, mean_spacing
 from ..progress import ends_at_one
 from ..types import Bools, Floats, Ints, Progress
@@ -534,6 +535,6 @@ class _Likelihood:
         gradient = np.append(0.0, _PRIOR[1:]) * found - self._sums @ self._first
         self._sums.data = miss * (1.0 - miss) / _BLUR**2
         hessian = (self._sums @ self._second)[:, _MIRRORED].reshape(-1, 3, 3) + np.diag(_PRIOR)
-        step: Floats = np.linalg.solve(hessian, gradient[:, :, None])[:, :, 0]
+        step: Floats = solve(hessian, gradient[:, :, None])[:, :, 0]
         result: Floats = step / np.maximum(np.abs(step / _LARGEST).max(axis=1, keepdims=True), 1.0)
         return result

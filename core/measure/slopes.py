@@ -8,6 +8,7 @@ from ..algebra import blocks, lifted_inverse, on_all_cores
 from ..arguments import as_array, as_doubles, check_array, check_positions
 from ..cores import cores
 from ..geometry import Discs, frames
+from ..linalg import solve
 from ..types import Floats
 
 _COUNT = 12  # neighbors: two rings of an even sample
@@ -109,7 +110,7 @@ def _fit(flat: list[Floats], height: Floats, rise: Floats) -> Floats:
     inner, sums = weighted @ terms.transpose(0, 2, 1), weighted @ rise[:, :, None]
     second = inner[:, 2:, 2:]
     second = second + (_RIDGE * np.trace(second, axis1=1, axis2=2) + np.finfo(float).tiny)[:, None, None] * np.eye(3)
-    known = np.linalg.solve(second, np.concatenate([inner[:, 2:, :2], sums[:, 2:]], axis=2))
+    known = solve(second, np.concatenate([inner[:, 2:, :2], sums[:, 2:]], axis=2))
     alone = np.concatenate([inner[:, :2, :2], sums[:, :2]], axis=2)
     left = alone - inner[:, :2, 2:] @ known
     known *= (_determinant(left) > _DETERMINED * _determinant(alone))[:, None, None]

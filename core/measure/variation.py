@@ -3,6 +3,7 @@
 import numpy as np
 from scipy import sparse
 
+from ..linalg import eigvalsh
 from ..operator import LaplaceBeltrami
 from ..types import Floats
 
@@ -51,6 +52,6 @@ def surface_variation(laplacian: LaplaceBeltrami) -> Floats:
     mean = neighbors @ centered / mass
     products = np.einsum("ni,nj->nij", centered, centered).reshape(-1, 9)
     covariance = (neighbors @ products / mass).reshape(-1, 3, 3) - np.einsum("ni,nj->nij", mean, mean)
-    spread = np.linalg.eigvalsh(covariance)
+    spread = eigvalsh(covariance)
     result: Floats = np.clip(spread[:, 0], 0.0, None) / np.maximum(spread.sum(axis=1), 1e-300)
     return np.where(laplacian.component < 0, 0.0, result)

@@ -6,6 +6,7 @@ import numpy as np
 from scipy import sparse
 
 from ..geometry import frames
+from ..linalg import pinv
 from .laplacian import LaplaceBeltrami
 
 _ROUNDING = 1e-9  # smaller over larger extent of the neighbors, squared, below which they lie on a line
@@ -58,7 +59,7 @@ def gradient_matrix(laplacian: LaplaceBeltrami) -> sparse.csr_array:
     step = np.einsum("ka,kab->kb", points[column] - points[row], tangents[row])
     products = np.einsum("k,ka,kb->kab", weight, step, step).reshape(-1, 4)
     moments = np.stack([np.bincount(row, product, minlength=n) for product in products.T], axis=1).reshape(n, 2, 2)
-    inverse = np.linalg.pinv(moments, rcond=_ROUNDING, hermitian=True)
+    inverse = pinv(moments, rcond=_ROUNDING, hermitian=True)
     share = weight[:, None] * np.einsum("kab,kbc,kc->ka", tangents[row], inverse[row], step)
     own = np.stack([np.bincount(row, -part, minlength=n) for part in share.T], axis=1)
     every, axis = np.arange(n), np.arange(3)

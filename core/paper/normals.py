@@ -6,6 +6,7 @@ from scipy.spatial import cKDTree
 from ..algebra import blocks, on_all_cores
 from ..geometry import Pairs, check_surface, count_curves, fading_weights, roundness
 from ..kernel import kernel
+from ..linalg import eigh
 from ..types import Floats
 
 _AROUND = 90  # neighbors of a plane that a point is projected onto
@@ -47,7 +48,7 @@ def covariance_normals(pairs: Pairs, weighted: bool = True) -> Floats:
     covariance[:, axes[0], axes[1]] = covariance[:, axes[1], axes[0]] = (
         moments[:, 4:] - mean[:, axes[0]] * mean[:, axes[1]]
     )
-    variances, directions = np.linalg.eigh(covariance)
+    variances, directions = eigh(covariance)
     check_surface(count_curves(roundness(variances)), len(variances))
     return np.ascontiguousarray(directions[:, :, 0])
 
@@ -62,7 +63,7 @@ def tangent_planes(points: Floats) -> Floats:
         weight /= weight.sum(axis=1, keepdims=True)
         mean = np.einsum("ik,ikc->ic", weight, points[index])
         centered = points[index] - mean[:, None]
-        normal = np.linalg.eigh(np.swapaxes(weight[:, :, None] * centered, 1, 2) @ centered)[1][:, :, 0]
+        normal = eigh(np.swapaxes(weight[:, :, None] * centered, 1, 2) @ centered)[1][:, :, 0]
         result[part] = points[part] + np.einsum("ic,ic->i", mean - points[part], normal)[:, None] * normal
 
     on_all_cores(project, blocks(len(points), _BLOCK))

@@ -11,6 +11,7 @@ from ..arguments import real
 from ..errors import InvalidPointsError, PointCloudError
 from ..frozen import Frozen
 from ..geometry import check_points, check_values
+from ..linalg import svd
 from ..operator import Spectrum
 from ..types import Floats, Ints
 
@@ -127,7 +128,7 @@ def match_modes(
     continues = linear_sum_assignment(weights, maximize=True)[1]
     rotation = np.zeros((count, count))
     for group in groups:
-        left, _, right = np.linalg.svd(overlaps[np.ix_(group, continues[group])])
+        left, _, right = svd(overlaps[np.ix_(group, continues[group])])
         rotation[np.ix_(group, continues[group])] = left @ right
     return MatchedModes(Spectrum(values @ rotation**2, vectors @ rotation), np.sum(rotation * overlaps, axis=0))
 

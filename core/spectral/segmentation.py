@@ -9,6 +9,7 @@ from ..arguments import real, whole
 from ..errors import ComponentError, PointCloudError, TooFewPointsError, UnresolvedModesError
 from ..geometry import check_values
 from ..kernel import RESOLVED
+from ..linalg import eigh
 from ..operator import LaplaceBeltrami, NearGraph, near_graph
 from ..progress import ends_at_one
 from ..types import Array, Floats, Ints, Progress
@@ -320,7 +321,7 @@ def _main_axis(points: Floats, weight: Floats) -> tuple[float, Floats, Floats]:
         return 0.0, np.zeros(points.shape[1]), np.zeros(points.shape[1])
     mean = weight @ points / weight.sum()
     offset = points - mean
-    scatter, axes = np.linalg.eigh((offset * weight[:, None]).T @ offset)
+    scatter, axes = eigh((offset * weight[:, None]).T @ offset)
     return scatter[-1], mean, axes[:, -1]
 
 

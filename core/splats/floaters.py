@@ -7,6 +7,7 @@ from ..algebra import blocks, on_all_cores
 from ..arguments import check_finite
 from ..cores import cores
 from ..errors import InvalidPointsError
+from ..linalg import solve
 from ..types import Bools, Floats, Ints
 from .splats import Splats
 
@@ -84,7 +85,7 @@ def _gaps(positions: Floats, covariances: Floats) -> Floats:
         near = index[rows]
         steps = positions[near] - positions[rows][:, None]
         both = covariances[near] + covariances[rows][:, None]
-        squares = np.einsum("nki,nki->nk", steps, np.linalg.solve(both, steps[..., None])[..., 0])
+        squares = np.einsum("nki,nki->nk", steps, solve(both, steps[..., None])[..., 0])
         result[rows] = np.sqrt(np.partition(squares, _AGREEING - 1, axis=1)[:, _AGREEING - 1])
 
     on_all_cores(measure, blocks(len(positions), _BLOCK))

@@ -8,6 +8,7 @@ Rendering. ACM Trans. Graph. 42, 2023.
 import numpy as np
 
 from ..algebra import blocks, on_all_cores
+from ..linalg import inv
 from ..types import Array, Floats
 
 COUNTS = (0, 3, 8, 15, 24)  # of harmonics up to the degrees 0 to 4
@@ -117,7 +118,7 @@ def _fit(degree: int) -> tuple[Floats, Array]:
     angle = _GOLDEN * np.arange(2 * degree + 1)
     ring = np.sqrt(1.0 - z * z)
     directions = np.column_stack([ring * np.cos(angle), ring * np.sin(angle), z])
-    return directions, np.linalg.inv(_of_degree(degree, directions))
+    return directions, inv(_of_degree(degree, directions))
 
 
 _FITS = tuple(map(_fit, range(1, len(COUNTS))))

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from ..algebra import nearest_rotations
 from ..arguments import as_array, check_array, check_finite
 from ..frozen import Frozen
+from ..linalg import det
 from ..types import Array, Floats
 from .columns import SplatFile
 from .ellipsoids import mapped, matrices_of
@@ -127,7 +128,7 @@ class Splats(Frozen):
             for values, new in zip(shapes, changed, strict=True):
                 values[rows] = new
         scales, rotations, harmonics = shapes
-        file = self.file and self.file.scaled(np.cbrt(np.abs(np.linalg.det(maps))))
+        file = self.file and self.file.scaled(np.cbrt(np.abs(det(maps))))
         return replace(self, positions=moved, scales=scales, rotations=rotations, harmonics=harmonics, file=file)
 
 
@@ -140,7 +141,7 @@ def _mapped(scales: Floats, rotations: Floats, harmonics: Array, maps: Floats) -
 
 def orthogonal_parts(gradients: Floats) -> Floats:
     """Return the orthogonal matrices nearest to maps, (n, 3, 3): rotations, mirrored where the maps mirror."""
-    sign = np.where(np.linalg.det(gradients) < 0.0, -1.0, 1.0)
+    sign = np.where(det(gradients) < 0.0, -1.0, 1.0)
     rotations = nearest_rotations(np.ascontiguousarray(np.moveaxis(gradients * sign[:, None, None], 0, 2)))
     return np.moveaxis(rotations * sign, 2, 0)
 

@@ -37,6 +37,7 @@ from ..geometry import (
     sheet_neighbors,
     with_scatter,
 )
+from ..linalg import eigh
 from ..memory import check_memory
 from ..options import LaplacianOptions
 from ..types import Floats, Ints
@@ -71,7 +72,7 @@ def agree_on_rounding(store: Store, options: LaplacianOptions) -> Record:
     count = np.array(list(store.told("rounding", "count")))
     if count[found].sum() <= 0.5 * count.sum():
         return {"rounded": np.zeros(3)}
-    square, axes = np.linalg.eigh(sum(store.told("rounding", "squares")) / count[found].sum())
+    square, axes = eigh(sum(store.told("rounding", "squares")) / count[found].sum())
     return {"rounded": np.sqrt(square[2]) * axes[:, 2]}
 
 

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ... import core
+from ...core.linalg import inv
 from ..objects.attributes import MOVED_DISC
 from ..objects.carried import local_gradients, moved_discs, moved_splats
 from .handles import Binding, HandlePose
@@ -77,7 +78,7 @@ class Follower:
         else:
             solver, steps = self.prepare(progress).exact, pose.steps
         points, _, converged = solver.deform(handles @ bound.matrix.T, steps=steps, start=start, progress=progress)
-        displacement, carried = (points - rest) @ np.linalg.inv(bound.matrix).T, {}
+        displacement, carried = (points - rest) @ inv(bound.matrix).T, {}
         if bound.splats is not None or discs is not None:
             gradients = local_gradients(solver.gradients(points), bound.matrix)
             carried = carried_along(bound.splats, discs, bound.rest + displacement, gradients, state)

@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 from mathutils import Matrix
 
+from ...core.linalg import inv
 from ..objects.animation import moves_by_keys, stop_moving
 from ..objects.attributes import REST, own_positions, point_count, positions_now, read_attribute, write_own_positions
 from ..objects.carried import carries
@@ -159,7 +160,7 @@ def _edited(obj, constraints):
 def _empty_change(obj, item, depsgraph):
     """Return the transform of handles by their empty since they were bound, in local space, (4, 4)."""
     rest = np.reshape(item.rest, (4, 4)).astype(np.float64)
-    return relative_matrix(obj, item.empty, depsgraph) @ np.linalg.inv(rest)
+    return relative_matrix(obj, item.empty, depsgraph) @ inv(rest)
 
 
 def keyed_empties(obj) -> list:

@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 
 from ...core import PointCloudError
+from ...core.linalg import cond, inv
 from ...tools.quantities import DISPLACEMENT
 from ..objects.attributes import in_edit_mesh, point_count, tag_changed, write_attribute
 from ..objects.carried import write_moved
@@ -51,11 +52,11 @@ def relative_matrix(obj, other, depsgraph=None):
     if depsgraph is not None:
         obj, other = obj.evaluated_get(depsgraph), other.evaluated_get(depsgraph)
     matrix = np.array(obj.matrix_world, dtype=np.float64)
-    if not np.linalg.cond(matrix[:3, :3]) < 1e6:
+    if not cond(matrix[:3, :3]) < 1e6:
         raise PointCloudError(
             f'"{obj.name}" is scaled to nothing along an axis. Give it a scale above zero along each axis.'
         )
-    return np.linalg.inv(matrix) @ np.array(other.matrix_world, dtype=np.float64)
+    return inv(matrix) @ np.array(other.matrix_world, dtype=np.float64)
 
 
 def is_there(obj, scene=None) -> bool:

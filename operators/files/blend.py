@@ -14,6 +14,7 @@ from ...command.settings import LAPLACIAN, add_setting
 from ...core import PointCloudError
 from ...core.files import SCANNER, PointTable
 from ...core.files.table import NORMAL as FILE_NORMAL
+from ...core.linalg import inv
 from ...tools.quantities import APPLICATIONS, MEAN_CURVATURE, NORMAL, ORIENTATION, RESULTS
 from ..objects.attributes import (
     check_size,
@@ -129,14 +130,14 @@ class Owner:
             check_movable(obj)
 
     def _local(self, vectors):
-        return vectors @ np.linalg.inv(_linear(self.obj)).T
+        return vectors @ inv(_linear(self.obj)).T
 
     def _move(self, given):
         """Move the points, or the splats with their ellipsoids."""
         data, moved = self.obj.data, self._local(positions(given) - positions(self.before))
         check_size("position", moved)
         if has_splats(data):
-            maps = np.broadcast_to(np.linalg.inv(_linear(self.obj)), (len(moved), 3, 3))
+            maps = np.broadcast_to(inv(_linear(self.obj)), (len(moved), 3, 3))
             write_splats(data, given.deformed(own_positions(data) + moved, maps))
             return
         write_own_positions(data, own_positions(data) + moved)

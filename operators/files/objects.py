@@ -16,6 +16,7 @@ from ...core.files import (
 )
 from ...core.files.table import NORMAL as FILE_NORMAL
 from ...core.files.table import SCANNER
+from ...core.linalg import det
 from ...tools.groups import column_weights
 from ...tools.quantities import NORMAL, PREFIX
 from ..objects.attributes import ONLY_DRAWN, STORABLE, read_attribute, type_of, write_attribute
@@ -149,7 +150,7 @@ def _is_column(layer):
 def _world_normals(normals, matrix):
     """Transform local normals to unit normals of the world, by cofactors, which singular matrices have too."""
     cofactors = np.stack([np.cross(matrix[i - 2], matrix[i - 1]) for i in range(3)])
-    world = normals.astype(np.float64) @ cofactors.T * (-1.0 if np.linalg.det(matrix) < 0.0 else 1.0)
+    world = normals.astype(np.float64) @ cofactors.T * (-1.0 if det(matrix) < 0.0 else 1.0)
     length = np.linalg.norm(world, axis=1, keepdims=True)
     return (world / np.where(length > 0.0, length, 1.0)).astype(np.float32)
 

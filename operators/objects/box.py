@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 
 from ...core import PointCloudError
+from ...core.linalg import det, inv
 
 
 class Box(NamedTuple):
@@ -22,7 +23,7 @@ class Box(NamedTuple):
 
     def holds(self, points):
         """Return which points, (n, 3), lie inside, (n,) bool."""
-        return (np.abs((points - self.center) @ np.linalg.inv(self.edges).T) <= 1.0).all(axis=1)
+        return (np.abs((points - self.center) @ inv(self.edges).T) <= 1.0).all(axis=1)
 
 
 def box_of(context, name, offset) -> Box:
@@ -42,6 +43,6 @@ def box_of(context, name, offset) -> Box:
     matrix = np.array(obj.matrix_world)
     edges = matrix[:3, :3] * (0.5 * (high - low))
     lengths = np.linalg.norm(edges, axis=0)
-    if not abs(np.linalg.det(edges)) > 1e-9 * np.prod(lengths) > 0.0:
+    if not abs(det(edges)) > 1e-9 * np.prod(lengths) > 0.0:
         raise PointCloudError(f'"{name}" is flat, so nothing is inside its box. Scale it, or choose another object')
     return Box(matrix[:3, :3] @ (0.5 * (low + high)) + matrix[:3, 3] + offset, edges)

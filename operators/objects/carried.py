@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 
 from ... import core
+from ...core.linalg import inv
 from .attributes import (
     DISC,
     MOVED_DISC,
@@ -66,7 +67,7 @@ def write_discs(obj, values):
 
 def local_gradients(gradients, matrix):
     """Transform deformation gradients, (n, 3, 3), to local space, from which a matrix, (3, 3), leads."""
-    both = np.kron(np.linalg.inv(matrix).T, matrix)  # one large product: n small ones take ten times as long
+    both = np.kron(inv(matrix).T, matrix)  # one large product: n small ones take ten times as long
     return (gradients.reshape(-1, 9) @ both).reshape(-1, 3, 3)
 
 

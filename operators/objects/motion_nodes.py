@@ -3,6 +3,7 @@
 import bpy
 import numpy as np
 
+from ...core.linalg import det
 from ...tools.quantities import MOTION, MOTION_MODE, NORMAL
 from .animation import curves
 from .attributes import remove_numbered, write_attribute
@@ -49,7 +50,7 @@ def show_motion(obj, height: float, normals, formula, first: int, frames: int):
     modifier.node_group = _new_group(formula, bool(height))
     if formula is not None and not formula.is_single:
         _key_amplitudes(modifier.node_group, formula, first, frames)
-    scale = np.linalg.det(metric(obj)) ** (1.0 / 6.0)  # the metric has squares of lengths
+    scale = det(metric(obj)) ** (1.0 / 6.0)  # the metric has squares of lengths
     for name, value in ((_HEIGHT, float(height / scale)), (_FIRST, first), (_FRAMES, max(frames - 1, 1))):
         set_input(modifier, name, value)
 

@@ -5,6 +5,7 @@ import json
 import numpy as np
 
 from ...core import PointCloudError
+from ...core.linalg import inv
 from .animation import moves_by_driver, moves_by_keys
 from .attributes import point_count
 
@@ -58,7 +59,7 @@ def move_object(obj, matrix):
 
     If its channels cannot express it, where its parent is scaled unevenly, `PointCloudError` is raised.
     """
-    parent = np.array(obj.matrix_world) @ np.linalg.inv(obj.matrix_basis)
+    parent = np.array(obj.matrix_world) @ inv(obj.matrix_basis)
     obj.matrix_world = matrix
     wanted, found = np.array(matrix), parent @ np.array(obj.matrix_basis)
     size = np.abs(wanted[:3, :3]).max()

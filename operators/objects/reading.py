@@ -8,6 +8,7 @@ import numpy as np
 
 from ... import core
 from ...core import PointCloudError
+from ...core.linalg import cond, inv
 from ...tools.quantities import ORIENTATION, quantity
 from .attributes import CORNER, has_vectors, own_positions, point_count, read_attribute
 from .counting import members
@@ -85,7 +86,7 @@ class Reading:
 
     def local(self, vectors):
         """Transform points or displacements, as read, to local space."""
-        return vectors @ np.linalg.inv(self.matrix).T
+        return vectors @ inv(self.matrix).T
 
     def placed(self, vectors):
         """Transform local points or displacements to those as read."""
@@ -101,7 +102,7 @@ class Reading:
 
     def placed_normals(self, normals):
         """Transform local normals to those of the points as read, of any length."""
-        return normals @ np.linalg.inv(self.matrix)
+        return normals @ inv(self.matrix)
 
 
 def local_values(reading, name, values):
@@ -137,7 +138,7 @@ def read_points(context, obj) -> Reading:
 def checked_matrix(obj):
     """Return the linear part of an object's matrix, (3, 3) float64, which must not be flat."""
     matrix = np.array(obj.matrix_world, dtype=np.float64)[:3, :3]
-    if not np.linalg.cond(matrix) < 1e6:
+    if not cond(matrix) < 1e6:
         raise PointCloudError(
             f'"{obj.name}" is scaled to nothing along an axis, so its {point_count(obj.data)} points have no area.'
             " Give it a scale above zero along each axis."

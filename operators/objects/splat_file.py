@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 
+from ...core.linalg import solve
 from .attributes import own_positions, read_attribute, remove_attributes, write_attribute, write_own_positions
 from .place import OFFSET, offset_of
 
@@ -90,4 +91,4 @@ def own_offset(obj):
         return np.array(obj[OWN_OFFSET], dtype=np.float64)
     if OFFSET not in obj:
         return np.zeros(3)
-    return np.linalg.solve(np.array(obj.matrix_world, dtype=np.float64)[:3, :3], offset_of(obj))
+    return solve(np.array(obj.matrix_world, dtype=np.float64)[:3, :3], offset_of(obj))

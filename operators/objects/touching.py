@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 
 from ...core import PointCloudError
+from ...core.linalg import pinv
 
 
 def places_of(context, obj, name: str, frames) -> list:
@@ -23,7 +24,7 @@ def places_of(context, obj, name: str, frames) -> list:
             scene.frame_set(frame)
             depsgraph = context.evaluated_depsgraph_get()
             places = _places(other.evaluated_get(depsgraph))
-            inverse = np.linalg.pinv(np.array(obj.evaluated_get(depsgraph).matrix_world))
+            inverse = pinv(np.array(obj.evaluated_get(depsgraph).matrix_world))
             local = places @ inverse[:3, :3].T + inverse[:3, 3]
             found.append(local @ axes.T)
     finally:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ... import core
+from ...core.linalg import inv
 from ..deform.follower import Moved, carried_along
 from ..deform.pose import Pose, State
 from ..objects.carried import local_gradients
@@ -73,7 +74,7 @@ class BoneFollower:
         linear = pose.relative[:3, :3]
         if bound.places:
             moved -= points
-            displacement = moved @ np.linalg.inv(linear).T
+            displacement = moved @ inv(linear).T
         else:
             displacement = np.zeros(bound.rest.shape)
         waits = state is State.QUICK and bound.splats is not None and bound.splats.harmonics.shape[1] > 0

@@ -6,6 +6,7 @@ import numpy as np
 
 from ... import core
 from ...core import PointCloudError
+from ...core.linalg import cond
 
 
 class Bones(NamedTuple):
@@ -55,7 +56,7 @@ def ends_seen_from(obj, armature, bones):
     axis raises `PointCloudError`.
     """
     matrix = np.array(armature.matrix_world)
-    if not np.linalg.cond(matrix[:3, :3]) < 1e6:
+    if not cond(matrix[:3, :3]) < 1e6:
         raise PointCloudError(
             f'"{armature.name}" is scaled to nothing along an axis. Give it a scale above zero along each axis.'
         )

@@ -8,6 +8,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ...core import PointCloudError
+from ...core.linalg import cond, inv
 from ..deform import binding, kinds, live
 from ..deform.handles import groups_checksum
 from ..deform.nodes import add_deform
@@ -49,7 +50,7 @@ class Bones:
         armature = obj.meshfree.deform.armature
         posed = armature if depsgraph is None else armature.evaluated_get(depsgraph)
         now = bone_matrices(posed.pose.bones, _names(obj), "matrix")
-        changes = (now @ np.linalg.inv(_rest(obj)))[:, :3]
+        changes = (now @ inv(_rest(obj)))[:, :3]
         relative, key, preserve = _to_armature(obj, armature, depsgraph), self.key(obj), _preserves_volume(obj)
         asked = (*key[1:], obj.meshfree.deform.groups_used, preserve, carries(obj))
         checksums = [zlib.crc32(repr(asked).encode()), 0]
@@ -294,11 +295,11 @@ def _read_binding(obj):
 def _to_armature(obj, armature, depsgraph=None):
     """Return the matrix from the space of an object to that of an armature, (4, 4)."""
     inverse = relative_matrix(obj, armature, depsgraph)
-    if not np.linalg.cond(inverse[:3, :3]) < 1e9:
+    if not cond(inverse[:3, :3]) < 1e9:
         raise PointCloudError(
             f'"{armature.name}" is scaled to nothing along an axis. Give it a scale above zero along each axis.'
         )
-    return np.linalg.inv(inverse)
+    return inv(inverse)
 
 
 def _preserves_volume(obj):

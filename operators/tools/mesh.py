@@ -6,6 +6,7 @@ import numpy as np
 from bpy.props import BoolProperty
 
 from ...command.colors import COLOR, average
+from ...core.linalg import det
 from ...tools import mesh_surface
 from ...tools.quantities import quantity
 from ..objects.attributes import DISC, STORABLE, point_count, read_attribute, write_attribute
@@ -40,7 +41,7 @@ class MeshObject:
         def compute(progress):
             _, laplacian, own, reading = planned(progress)
             mesh, carrying = mesh_surface.carried_mesh(laplacian, own.detail, progress)
-            faces = mesh.faces if np.linalg.det(reading.matrix) > 0.0 else mesh.faces[:, ::-1]
+            faces = mesh.faces if det(reading.matrix) > 0.0 else mesh.faces[:, ::-1]
             carried = kept.carried(carrying, len(mesh.vertices))
             return reading.local(mesh.vertices), faces, carried, mesh.notices
 

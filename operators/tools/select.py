@@ -11,6 +11,7 @@ from bpy_extras import view3d_utils
 from ... import core
 from ...command.naming import naming
 from ...core import PointCloudError
+from ...core.linalg import det, pinv
 from ...tools.groups import HANDLE, SOURCE
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import (
@@ -264,13 +265,13 @@ class OnSurface:
         points[_hidden(obj)] = np.nan
         if eye is not None or not any(self.direction):
             points[_clipped(context.space_data.region_3d, points)] = np.nan
-        scale = np.cbrt(abs(np.linalg.det(world[:3, :3])))
+        scale = np.cbrt(abs(det(world[:3, :3])))
         radii, normals = np.full(len(points), _LOOSE), None
         if has_vectors(data, DISC):
             discs = read_attribute(data, DISC)
             reach = np.linalg.norm(discs, axis=1)
             radii = np.where(reach > 0.0, reach * obj.meshfree.point_size, _LOOSE)
-            normals = discs @ np.linalg.pinv(world[:3, :3])
+            normals = discs @ pinv(world[:3, :3])
         radii *= scale * (obj.meshfree.spacing or spacing(data))
         return core.distance.seen_points(points, radii, view, eye, normals, chosen)
 
@@ -442,7 +443,7 @@ class MESHFREE_OT_select_point(ReadyOperator, bpy.types.Operator):
             matrix = np.array(obj.matrix_world)
             points = positions_now(obj) @ matrix[:3, :3].T + matrix[:3, 3]
             points[_hidden(obj)] = np.nan
-            known = obj.meshfree.spacing * np.cbrt(abs(np.linalg.det(matrix[:3, :3])))  # where a display measured it
+            known = obj.meshfree.spacing * np.cbrt(abs(det(matrix[:3, :3])))  # where a display measured it
             index = core.distance.front_point(
                 points, eye, direction, 2.0 * (known or core.geometry.typical_distance(points))
             )

@@ -7,6 +7,7 @@ from mathutils import Matrix
 from ... import core
 from ...core import PointCloudError
 from ...core.files import is_coarse
+from ...core.linalg import cond, inv
 from ..objects.all_or_nothing import all_or_nothing
 from ..objects.attributes import point_count, read_attribute, write_attribute
 from ..objects.modifiers import is_deform
@@ -90,7 +91,7 @@ class MESHFREE_OT_join_splats(SplatOperator, bpy.types.Operator):
     def execute(self, context):
         obj, others = context.object, _others(context)
         _check_together(obj, others)
-        matrix = np.linalg.inv(np.array(obj.matrix_world, dtype=np.float64))
+        matrix = inv(np.array(obj.matrix_world, dtype=np.float64))
         parts = [_placed(other, matrix @ _apart(other, obj) @ np.array(other.matrix_world)) for other in others]
         _check_near(obj, others, parts)
         for each in filter(lambda each: are_left_behind(each.data), (obj, *others)):
@@ -124,7 +125,7 @@ def _check_placeable(obj, matrix):
     check_movable(obj, "IN_PLACE")
     if any(map(is_deform, obj.modifiers)):
         raise PointCloudError(f'"{obj.name}" is bound. Unbind it first.')
-    if not np.linalg.cond(matrix[:3, :3]) < 1e6:
+    if not cond(matrix[:3, :3]) < 1e6:
         raise PointCloudError(
             f'"{obj.name}" is scaled to nothing along an axis. Give it a scale above zero along each axis.'
         )
