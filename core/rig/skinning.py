@@ -269,7 +269,7 @@ def _check_table(weights: Any, shape: tuple[int | None, int | None]) -> sparse.c
     fits = all(wanted in (None, size) for wanted, size in zip(shape, weights.shape, strict=True))
     if not fits or not np.isfinite(weights.data).all():
         raise InvalidPointsError(f"Weights have the shape {weights.shape}, or are not finite. {advice}")
-    table = sparse.csr_array(weights, dtype=np.float64)
+    table = sparse.csr_array(weights, dtype=np.float64, copy=True)  # sums are taken in place
     table.sum_duplicates()
     return table
 
@@ -283,7 +283,7 @@ def _named_table(weights: ArrayLike, bones: ArrayLike, count: int | None) -> spa
     advice = "Give a weight for each bone that is named."
     values = as_doubles(check_array(weights, "Weights", [named.shape], advice, "biuf"))
     ends = named.shape[1] * np.arange(len(named) + 1)
-    table = sparse.csr_array((values.ravel(), named.ravel(), ends), shape=(len(named), most))
+    table = sparse.csr_array((values.flatten(), named.flatten(), ends), shape=(len(named), most))  # copies of them
     table.eliminate_zeros()
     return _check_table(table, table.shape)
 

@@ -110,6 +110,16 @@ class TestSkin:
         with pytest.raises(core.InvalidPointsError, match="There are 2 bones"):
             core.rig.Skinner(self.weights, order, 2)
 
+    def test_the_arrays_of_the_caller_stay_as_they_are(self):
+        weights, bones = np.array([[1.0, 0.0], [0.0, 1.0], [0.4, 0.6]]), np.array([[0, 1], [1, 2], [0, 2]])
+        given = weights.copy(), bones.copy()
+        core.rig.Skinner(weights, bones)
+        assert np.array_equal(weights, given[0])
+        assert np.array_equal(bones, given[1])
+        twice = sparse.csr_array((np.array([0.25, 0.75, 1.0]), np.array([1, 1, 0]), np.array([0, 2, 3])), shape=(2, 2))
+        core.rig.Skinner(twice)
+        assert np.array_equal(twice.data, [0.25, 0.75, 1.0])
+
     def test_a_bent_bar_keeps_its_volume_by_screws(self):
         """A quarter of a turn about y: linear blending halves the cross section in the bend, screws do not."""
         angle = np.linspace(0, 2 * np.pi, 40, endpoint=False)
