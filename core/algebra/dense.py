@@ -1,6 +1,6 @@
 """Dense matrices: products by scipy's BLAS, as numpy may be built without a fast one; factors; many small inverses."""
 
-from ctypes import CFUNCTYPE, byref, c_char_p, c_double, c_float, c_int64, c_void_p, py_object, pythonapi
+from ctypes import CFUNCTYPE, PYFUNCTYPE, byref, c_char_p, c_double, c_float, c_int64, c_void_p, py_object, pythonapi
 from typing import Any
 
 import numpy as np
@@ -116,8 +116,8 @@ def _routine(library: Any, name: str, arguments: int) -> Any:
     Its whole numbers have 32 bits, or 64: of small positive ones the former are the first half of the latter.
     """
     capsule = library.__pyx_capi__[name]
-    signature = CFUNCTYPE(c_char_p, py_object)(("PyCapsule_GetName", pythonapi))(capsule)
-    address = CFUNCTYPE(c_void_p, py_object, c_char_p)(("PyCapsule_GetPointer", pythonapi))(capsule, signature)
+    signature = PYFUNCTYPE(c_char_p, py_object)(("PyCapsule_GetName", pythonapi))(capsule)
+    address = PYFUNCTYPE(c_void_p, py_object, c_char_p)(("PyCapsule_GetPointer", pythonapi))(capsule, signature)
     return CFUNCTYPE(None, *[c_void_p] * arguments)(address)
 
 

@@ -128,14 +128,14 @@ class Nearest:
 
     def averaged(self, values: Floats, rounds: int = 1) -> Floats:
         """Return quantities of points, (m, ...), after so many rounds of weighted means over the neighbors."""
-        count, width = self.index.shape
+        (count, width), total = self.index.shape, self._total
 
         def mean(rows: slice) -> Floats:
             part = sparse.csr_array((rows.stop - rows.start, count))
             # Set afterwards, for the constructor would copy a slice of an array.
             part.data, part.indices = self.weight[rows].ravel(), self.index[rows].ravel()
             part.indptr = np.arange(0, part.data.size + 1, width, dtype=np.int32)
-            result: Floats = ((part @ values).T / self._total[rows]).T
+            result: Floats = ((part @ values).T / total[rows]).T
             return result
 
         for _ in range(rounds):
