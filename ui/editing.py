@@ -239,7 +239,8 @@ def _draw():
 def _draw_object(context, obj):
     kept = _kept.get(obj.session_uid)
     if kept is None:
-        kept = _kept[obj.session_uid] = _keep(obj, look(obj, context.evaluated_depsgraph_get()))
+        seen = look(obj, context.view_layer.depsgraph)  # as drawn: an update would run handlers, which write
+        kept = _kept[obj.session_uid] = _keep(obj, seen)
     if not kept.shown.any():
         return
     if kept.batch is None:
