@@ -117,7 +117,8 @@ class MESHFREE_OT_import_tiles(ImportOperator, bpy.types.Operator):
     @reporting
     def execute(self, context):
         paths, shared = self.chosen(), known_offset(context.scene)
-        self._name, self._files = _name_of(paths), len(paths)
+        name = _name_of(paths)
+        self._name, self._files = name, len(paths)
         wanted = _Wanted(
             self.count if self.density == "NUMBER" else None,
             self.level if self.density == "LEVEL" else None,
@@ -125,7 +126,7 @@ class MESHFREE_OT_import_tiles(ImportOperator, bpy.types.Operator):
             self.las_choices(),
             self.attributes,
         )
-        return self.begin(context, lambda progress: _read(paths, wanted, self._name, progress))
+        return self.begin(context, lambda progress: _read(paths, wanted, name, progress))
 
     def _add(self, context, read):
         """Add the object."""

@@ -163,8 +163,19 @@ def same_lengths(before, now) -> bool:
 
 def length_text(size: float, power: int = 1) -> str:
     """Write a length in the units of the scene; with a power of 2 an area, with 3 a volume."""
-    units, kind = bpy.context.scene.unit_settings, ("LENGTH", "AREA", "VOLUME")[power - 1]
-    return bpy.utils.units.to_string(units.system, kind, size * units.scale_length**power, precision=_DIGITS).strip()
+    return length_writer()(size, power)
+
+
+def length_writer():
+    """Return `length_text` in the units that the scene has now, for threads, which must not read them."""
+    units = bpy.context.scene.unit_settings
+    system, scale = units.system, units.scale_length
+
+    def write(size, power=1):
+        kind = ("LENGTH", "AREA", "VOLUME")[power - 1]
+        return bpy.utils.units.to_string(system, kind, size * scale**power, precision=_DIGITS).strip()
+
+    return write
 
 
 def area_text(area: float) -> str:

@@ -110,16 +110,12 @@ class WeightsFromSelection(Tool):
     def _distance(self, ones, reading):
         """Return a function that finds weights by distance, which points are reached, and a text."""
         radius = self.radius or _SHARE * float(np.linalg.norm(np.ptp(reading.points, axis=0)))
-        shape = self.falloff.lower()
+        shape, told = self.falloff.lower(), f"within {length_text(radius)}"
 
         def find(laplacian, progress):
             work = lambda: core.distance.geodesic_distance(laplacian, ones, progress=progress)  # noqa: E731
             distance = laplacian.kept.result("weights by distance", work, ones)
-            return (
-                core.distance.falloff(distance, radius, shape),
-                np.isfinite(distance),
-                f"within {length_text(radius)}",
-            )
+            return core.distance.falloff(distance, radius, shape), np.isfinite(distance), told
 
         return find
 

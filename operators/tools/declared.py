@@ -205,14 +205,14 @@ class Moving(Declared):
 
     def plan(self, context, obj):
         check_movable(obj, self.goal)
-        planned, carried = super().plan(context, obj), self.carries(obj)
+        planned, carried, tool = super().plan(context, obj), self.carries(obj), self.tool
         find_discs = disc_finder(obj)
 
         def compute(progress):
             found, laplacian, own, reading = planned(progress)
-            points = self.tool.moved(found, laplacian, own)
+            points = tool.moved(found, laplacian, own)
             gradients = core.deform.deformation_gradients(laplacian, points) if carried else None
-            shape = self.tool.shape(found)
+            shape = tool.shape(found)
             discs = None if shape is None else find_discs(reading, shape, points)
             return found, laplacian, own, reading, gradients, discs
 

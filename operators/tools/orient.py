@@ -10,7 +10,7 @@ from ...command.analysis import WRITE_LIMIT
 from ...tools import orient_normals
 from ...tools.quantities import AREA, NORMAL, ORIENTATION
 from ..objects.attributes import read_attribute
-from ..objects.result import length_text, write_result
+from ..objects.result import length_writer, write_result
 from ..running.application import operator_reader
 from .analyze import plan_analysis
 from .declared import ObjectCloud, registration_of
@@ -28,19 +28,20 @@ class Analyzed:
     def plan(self, context, obj):
         (reading, operator), tool, own = operator_reader(context, obj), self.tool, self.own()
         inputs = viewpoint, told = tool.inputs(ObjectCloud(context, obj, self, reading, operator), own)
+        length, told = length_writer(), [f"{obj.name}: {text}" for text in told]
 
         def orient(measured, progress):
             laplacian, normals, areas = measured.built.laplacian, measured.measures[NORMAL], measured.measures[AREA]
             seen = SimpleNamespace(points=reading.points, normals=normals, areas=areas)
             work = lambda: tool.compute(seen, inputs, own, progress)  # noqa: E731
             found = laplacian.kept.result(tool.name, work, tool.key(own), viewpoint, reading.points)
-            return tool.finish(found, seen, own, length_text).values[ORIENTATION]
+            return tool.finish(found, seen, own, length).values[ORIENTATION]
 
         analyze = plan_analysis(context, obj, orient=orient)
 
         def compute(progress):
             result = analyze(progress)
-            return replace(result, notices=[*(f"{obj.name}: {text}" for text in told), *result.notices])
+            return replace(result, notices=[*told, *result.notices])
 
         return compute
 

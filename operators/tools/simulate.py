@@ -15,7 +15,7 @@ from ...tools.quantities import MOTION, NORMAL
 from ..objects import motion_files
 from ..objects.motion import TEMPORARY, show_frame, show_values, write_frames
 from ..objects.motion_nodes import forget_groups, mode_name, show_motion
-from ..objects.result import length_text
+from ..objects.result import length_text, length_writer
 from ..objects.touching import places_of
 from ..running.application import operator_reader
 from .declared import registration_of
@@ -128,11 +128,11 @@ class Kept:
         step = 1 if modes else self._step(count, len(sources))
         chosen = simulate.chosen(self.own(), sources, count, step)
         places = places_of(context, obj, self.toucher, range(first, first + count)) if touches else []
-        path = None if modes else motion_files.new_path(obj, self.folder)
+        path, length = None if modes else motion_files.new_path(obj, self.folder), length_writer()
 
         def compute(progress):
             laplacian = operator(progress)
-            motion_of = find_touched(laplacian, chosen, places, length_text) if touches else chosen
+            motion_of = find_touched(laplacian, chosen, places, length) if touches else chosen
             if modes:
                 motion = in_modes(laplacian, motion_of, modes, progress)
             else:
