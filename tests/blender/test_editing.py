@@ -182,7 +182,7 @@ class TestDrawing:
                 region_data=SimpleNamespace(**view, use_clip_planes=clip, clip_planes=planes),
                 region=SimpleNamespace(height=self.SIDE),
                 preferences=bpy.context.preferences,
-                evaluated_depsgraph_get=bpy.context.evaluated_depsgraph_get,
+                view_layer=bpy.context.view_layer,
             )
             editing._kept.clear()
             target = gpu.types.GPUOffScreen(self.SIDE, self.SIDE, format="RGBA32F")

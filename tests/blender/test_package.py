@@ -224,7 +224,9 @@ bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=5)
 print("RUN", bpy.ops.meshfree.analyze(modes=0))
 print("THEN", len([name for name in sys.modules if name.partition(".")[0] == "scipy"]) > 100)
 """
-LIGHT = {f"core.{name}" for name in ("arguments", "control_groups", "errors", "memory", "options", "types")} | {"core"}
+LIGHT = {
+    f"core.{name}" for name in ("arguments", "control_groups", "errors", "linalg", "memory", "options", "types")
+} | {"core"}
 
 
 def test_blender_starts_without_what_only_the_tools_need(archive, tmp_path):
