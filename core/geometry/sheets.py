@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -349,6 +349,8 @@ def ways_along(steps: sparse.csr_array, tree: cKDTree, first: Ints, second: Ints
 
     `steps`, (m, m), are their lengths, symmetric; `longest`, (k,), is the greatest length of the path.
     """
+    if not len(first):
+        return np.zeros(0)
     # Search from the end that has more pairs: one search serves all pairs of its start.
     often = np.bincount(first, minlength=tree.n) + np.bincount(second, minlength=tree.n)
     swap = often[second] > often[first]
@@ -356,23 +358,37 @@ def ways_along(steps: sparse.csr_array, tree: cKDTree, first: Ints, second: Ints
     furthest = np.zeros(tree.n)
     np.maximum.at(furthest, first, longest)
     # Starts near each other share a subgraph; among them, those with paths of similar length are searched at once.
-    start = tree.indices[furthest[tree.indices] > 0.0]
-    start = start[np.lexsort((furthest[start], np.arange(len(start)) // _NEARBY))]
+    start = np.flatnonzero(furthest)
+    groups = [start[some] for some in _near_each_other(tree.data[start], _NEARBY)]
+    groups = [some[np.argsort(furthest[some], kind="stable")] for some in groups]
+    start = np.concatenate(groups)
     number = np.empty(tree.n, dtype=np.int64)
     number[start] = np.arange(len(start))
     order = np.argsort(number[first], kind="stable")
     ends = np.searchsorted(number[first[order]], np.arange(len(start) + 1))
     result = np.empty(len(first))
-    for nearby in blocks(len(start), _NEARBY):
-        places = tree.data[start[nearby]]
+    for some in groups:
+        places = tree.data[some]
         low, high = places.min(axis=0), places.max(axis=0)
-        reach = 0.5 * np.linalg.norm(high - low) + furthest[start[nearby]].max()
+        reach = 0.5 * np.linalg.norm(high - low) + furthest[some[-1]]
         around = np.array(tree.query_ball_point(0.5 * (low + high), reach, return_sorted=True))
         local = steps[around][:, around]
-        for part in blocks(nearby.stop - nearby.start, _SOURCES):
-            begin, end = nearby.start + part.start, nearby.start + part.stop
-            source, rows = start[begin:end], order[ends[begin] : ends[end]]
-            limit = 1.001 * furthest[source].max()
+        for part in blocks(len(some), _SOURCES):
+            source = some[part]
+            begin = number[source[0]]
+            rows = order[ends[begin] : ends[begin + len(source)]]
+            limit = 1.001 * furthest[source[-1]]
             length = dijkstra(local, indices=np.searchsorted(around, source), limit=limit)
             result[rows] = length[number[first[rows]] - begin, np.searchsorted(around, second[rows])]
     return result
+
+
+def _near_each_other(points: Floats, most: int) -> Iterator[Ints]:
+    """Yield which of some points, (k, 3), lie near each other, at most so many: the leaves of a tree."""
+    nodes = [cKDTree(points, leafsize=most).tree]
+    while nodes:
+        node = nodes.pop()
+        if node.lesser is None:
+            yield node.indices
+        else:
+            nodes += [node.greater, node.lesser]
