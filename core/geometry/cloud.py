@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
 
 from ..algebra import workers
 from ..errors import ComponentError, TooFewPointsError
@@ -24,7 +25,7 @@ from .distances import measure_squared_slope
 from .doubt import likely_causes
 from .edges import Sides, find_sides, one_side
 from .nearest import find_nearest
-from .noise import FALLING, FILLING, LEFT, mean_misfits, near_misfit, noise_level, project_points
+from .noise import FALLING, FILLING, LEFT, mean_misfits, misfits, near_misfit, noise_level, project_points
 from .normals import unit_normals
 from .outliers import find_outliers
 from .pairs import Pairs, find_pairs
@@ -45,6 +46,7 @@ from .sheets import Sheets, fit_sheets, label_sheets, separate_sheets
 from .voids import find_voids, no_voids
 from .winding import orient_by_winding
 
+_ASKED = 5000  # points that fill volumes, about, whose median misfit is that of all
 _DRAWN = 20  # points that a surface needs at least, to be drawn
 _NARROW = 0.6  # h over the depth of a narrow surface, see `depth`, from which the kernel is too wide for it
 
@@ -304,32 +306,28 @@ def with_scatter(surface: Surface) -> Surface:
 def remove_noise(surface: Surface, options: LaplacianOptions, near: Floats | None = None) -> Surface:
     """Move points onto the surface that their neighbors describe, where the options or the noise ask for it.
 
-    Each round measures again only points that the last one moved, and their neighbors. The first one takes
-    `near_misfit`, (m,), if that is known. Where nothing is to be done the same surface is returned.
+    Once is enough, but where points fill volumes: these are moved again as long as it brings them nearer to a surface.
+    `near_misfit`, (m,), may be given where it is known. Where nothing is to be done the same surface is returned.
     """
     if options.projection == "off":
         return surface
-    near = near_misfit(surface.sample.nearest) if near is None else near.copy()
-    noise = measure_noise(surface, near)
+    sample, nearest = surface.sample, surface.sample.nearest
+    noise = measure_noise(surface, near_misfit(nearest) if near is None else near)
     if options.projection != "auto":
-        return _project(surface, noise, np.ones(len(noise), dtype=bool))[0]
-    noisy, decisions, rounds = noise > 0.0, surface.sample.decisions, 0
-    if not decisions.settle("noisy", lambda: bool(noisy.mean() >= MANY)):
+        return _moved(surface, _onto_quadrics(sample, nearest.tree, np.arange(len(noise)), noise), noise >= 0.0)
+    noisy, filling = noise > 0.0, np.flatnonzero(noise > FILLING)
+    if not sample.decisions.settle("noisy", lambda: bool(noisy.mean() >= MANY)):
         return surface
-    first, filling = np.where(noisy, noise, 0.0), noise > FILLING
-    before = _median_in_volumes(surface, noise, filling, rounds)
-    while noisy.any():
-        surface, changed = _project(surface, np.where(filling, first, noise), noisy)
-        rows = np.flatnonzero(changed)
-        near[rows] = near_misfit(surface.sample.nearest, rows)
-        noise = measure_noise(surface, near)
-        rounds += 1
-        left = _median_in_volumes(surface, noise, filling, rounds)
-        # Points whose misfit falls too slowly are left: it is shape and not noise, as of leaves.
-        noisy &= (left > LEFT) & (left < FALLING * before)
-        before = left
-    noise = np.maximum(surface.sample.noise, first)
-    return replace(surface, sample=replace(surface.sample, noise=noise))
+    tree, rows, rounds = nearest.tree, np.flatnonzero(noisy), 0
+    left = _misfit_of_some(sample, tree, filling, rounds)
+    while len(rows):
+        tree, rounds, before = cKDTree(_onto_quadrics(sample, tree, rows, noise)), rounds + 1, left
+        left = _misfit_of_some(sample, tree, filling, rounds)
+        # Where it falls too slowly it is shape and not noise, as of leaves.
+        rows = filling if LEFT < left < FALLING * before else filling[:0]
+    moved = _moved(surface, tree.data, noisy)
+    noise = np.maximum(sample.noise, np.where(noisy, noise, 0.0))
+    return replace(moved, sample=replace(moved.sample, noise=noise))
 
 
 def measure_noise(surface: Surface, near: Floats) -> Floats:
@@ -337,24 +335,31 @@ def measure_noise(surface: Surface, near: Floats) -> Floats:
     return noise_level(surface.sample.nearest, near, surface.mixed.misfit, surface.quadrics.misfit)
 
 
-def _median_in_volumes(surface: Surface, noise: Floats, filling: Bools, rounds: int) -> Floats:
-    """Return the noise, (m,), where points fill volumes replaced by their median misfit in spacings."""
-    sample = surface.sample
-    missed = surface.quadrics.misfit[filling] / sample.nearest.spacing[filling]
-    usual = sample.decisions.settle_round("filling", rounds, lambda: float(np.median(missed)) if len(missed) else 0.0)
-    return np.where(filling, usual, noise)
+def _misfit_of_some(sample: Sample, tree: cKDTree, rows: Ints, rounds: int) -> float:
+    """Return the median misfit, in spacings, of points that fill volumes, (k,) int, after so many rounds; 0 of none."""
+
+    def measure() -> float:
+        some = rows[:: 1 + len(rows) // _ASKED]
+        return float(np.median(misfits(tree, some))) if len(some) else 0.0
+
+    return sample.decisions.settle_round("filling", rounds, measure)
 
 
-def _project(surface: Surface, noise: Floats, moving: Bools) -> tuple[Surface, Bools]:
-    """Move some points onto quadrics through their neighbors; return also which moved, or have neighbors that did."""
-    sample, nearest = surface.sample, surface.sample.nearest
+def _onto_quadrics(sample: Sample, tree: cKDTree, rows: Ints, noise: Floats) -> Floats:
+    """Return the points of a tree, (m, 3), some of them, (k,) int, moved onto quadrics through their neighbors."""
     smallest = sample.decisions.settle("smallest", lambda: int(np.bincount(sample.component).min()))
-    points, rows = nearest.points.copy(), np.flatnonzero(moving)
-    points[rows] = project_points(nearest.tree, rows, noise, smallest)
+    points = tree.data.copy()
+    points[rows] = project_points(tree, rows, noise, smallest)
+    return points
+
+
+def _moved(surface: Surface, points: Floats, moving: Bools) -> Surface:
+    """Return the surface of points at other places, (m, 3), some of which, (m,) bool, have moved."""
+    nearest = surface.sample.nearest
     changed = moving | moving[nearest.index].any(axis=1)
     nearest = nearest.with_quadrics(surface.mixed).renewed(points, changed)
-    moved = replace(sample, nearest=look_across_rows(nearest))
-    return fit_surface(moved, surface.sheets is not None, surface, changed), changed
+    moved = replace(surface.sample, nearest=look_across_rows(nearest))
+    return fit_surface(moved, surface.sheets is not None, surface, changed)
 
 
 def divide_sheets(surface: Surface) -> Surface:

@@ -4,24 +4,30 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..algebra import blocks, on_all_cores
+from ..cores import cores
 from ..types import Floats, Ints
-from .nearest import COUNT, ENOUGH, ROUNDS, Nearest, fading_weights
+from .nearest import COUNT, ENOUGH, ROUNDS, Nearest, fading_weights, spacing_of
 from .quadrics import fit_quadrics
 
 _SHAPE = 1.6  # residual of a fit to 40 over that to 20, from which it is shape: noise leaves both alike
 _LEAST = 0.02  # noise below this share of the spacing is left alone
 LEFT = 0.08  # of the spacing: scatter about a fit that is negligible; it falls with the root of its neighbors
 FILLING = 0.4  # noise above this share fills the neighborhoods as a volume would
-FALLING = 0.9  # share of noise that a round leaves, at most: .3 of one spacing, .86 of three; leaves stay as they are
+FALLING = 0.85  # share of misfit that a round leaves, at most: .2 of noise of a spacing, .83 of three; .86 in volumes
 LARGEST = 90  # neighbors of the fit that points are projected on, at most: more would round the shape
 _BLOCK = 1 << 12  # points projected at one time
 
 
-def near_misfit(nearest: Nearest, rows: Ints | None = None) -> Floats:
-    """Return how far quadrics through 20 neighbors miss these, of all m points or of some rows, (k,)."""
-    near = slice(None) if rows is None else rows, slice(COUNT // 2 + 1)  # with the point itself
-    rows = np.arange(len(nearest.points)) if rows is None else rows
-    return fit_quadrics(nearest.points, nearest.index[near], fading_weights(nearest.distance[near]), rows).misfit
+def near_misfit(nearest: Nearest) -> Floats:
+    """Return how far quadrics through 20 neighbors miss these, (m,)."""
+    near = slice(None), slice(COUNT // 2 + 1)  # with the point itself
+    return fit_quadrics(nearest.points, nearest.index[near], fading_weights(nearest.distance[near])).misfit
+
+
+def misfits(tree: cKDTree, rows: Ints) -> Floats:
+    """Return how far quadrics through 40 neighbors of some points of a tree, (k,) int, miss these, in spacings."""
+    distance, index = tree.query(tree.data[rows], k=min(COUNT, tree.n), workers=cores())
+    return fit_quadrics(tree.data, index, fading_weights(distance), rows).misfit / spacing_of(distance)
 
 
 def mean_misfits(nearest: Nearest, *misfits: Floats) -> Floats:
