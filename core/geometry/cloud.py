@@ -315,7 +315,8 @@ def remove_noise(surface: Surface, options: LaplacianOptions, near: Floats | Non
     noise = measure_noise(surface, near_misfit(nearest) if near is None else near)
     if options.projection != "auto":
         return _moved(surface, _onto_quadrics(sample, nearest.tree, np.arange(len(noise)), noise), noise >= 0.0)
-    noisy, filling = noise > 0.0, np.flatnonzero(noise > FILLING)
+    noisy, volumes = noise > 0.0, noise > FILLING
+    filling = np.flatnonzero(volumes | (noisy & (nearest.averaged(volumes.astype(float)) > 0.5)))
     if not sample.decisions.settle("noisy", lambda: bool(noisy.mean() >= MANY)):
         return surface
     tree, rows, rounds = nearest.tree, np.flatnonzero(noisy), 0
