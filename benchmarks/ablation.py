@@ -66,6 +66,7 @@ MODULES = (
 UNTUNED = {  # why a number is no constant: its names, with the module where others have the same one
     "how much is done at one time": ("_BLOCK", "_SOURCES", "_NEARBY", "areas._MANY", "nearest._MEASURED"),
     "how many neighbors are searched among": ("moments._MORE", "rows._WIDER", "boundary._REACH"),
+    "how many points tell the median of all": ("cloud._SAMPLE",),
     "what is lost in rounding": ("_SAME", "_EVEN", "_SMALLEST", "_RIDGE", "_AT_BOUNDARY", "cells._CLOSEST", "NO_AREA"),
     "rounds after which an iteration has long ended": ("moments._STEPS", "edges._ROUNDS"),
     "how many terms or directions there are": ("TERMS", "edges._COEFFICIENTS", "NEXT"),

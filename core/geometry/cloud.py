@@ -46,7 +46,7 @@ from .sheets import Sheets, fit_sheets, label_sheets, separate_sheets
 from .voids import find_voids, no_voids
 from .winding import orient_by_winding
 
-_ASKED = 5000  # points that fill volumes, about, whose median misfit is that of all
+_SAMPLE = 5000  # points that fill volumes, about, whose median misfit is that of all
 _DRAWN = 20  # points that a surface needs at least, to be drawn
 _NARROW = 0.6  # h over the depth of a narrow surface, see `depth`, from which the kernel is too wide for it
 
@@ -340,7 +340,7 @@ def _misfit_of_some(sample: Sample, tree: cKDTree, rows: Ints, rounds: int) -> f
     """Return the median misfit, in spacings, of points that fill volumes, (k,) int, after so many rounds; 0 of none."""
 
     def measure() -> float:
-        some = rows[:: 1 + len(rows) // _ASKED]
+        some = rows[:: 1 + len(rows) // _SAMPLE]
         return float(np.median(misfits(tree, some))) if len(some) else 0.0
 
     return sample.decisions.settle_round("filling", rounds, measure)
