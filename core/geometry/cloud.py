@@ -316,17 +316,17 @@ def remove_noise(surface: Surface, options: LaplacianOptions, near: Floats | Non
     if options.projection != "auto":
         return _moved(surface, _onto_quadrics(sample, nearest.tree, np.arange(len(noise)), noise), noise >= 0.0)
     noisy, volumes = noise > 0.0, noise > FILLING
-    filling = np.flatnonzero(volumes | (noisy & (nearest.averaged(volumes.astype(float)) > 0.5)))
     if not sample.decisions.settle("noisy", lambda: bool(noisy.mean() >= MANY)):
         return surface
+    filling = np.flatnonzero(volumes | (noisy & (nearest.averaged(volumes.astype(float)) > 0.5)))
     tree, rows, rounds = nearest.tree, np.flatnonzero(noisy), 0
     left = _misfit_of_some(sample, tree, filling, rounds)
     while len(rows):
-        tree, rounds, before = cKDTree(_onto_quadrics(sample, tree, rows, noise)), rounds + 1, left
+        tree, rounds, before = _onto_quadrics(sample, tree, rows, noise), rounds + 1, left
         left = _misfit_of_some(sample, tree, filling, rounds)
         # Where it falls too slowly it is shape and not noise, as of leaves.
         rows = filling if LEFT < left < FALLING * before else filling[:0]
-    moved = _moved(surface, tree.data, noisy)
+    moved = _moved(surface, tree, noisy)
     noise = np.maximum(sample.noise, np.where(noisy, noise, 0.0))
     return replace(moved, sample=replace(moved.sample, noise=noise))
 
@@ -346,19 +346,19 @@ def _misfit_of_some(sample: Sample, tree: cKDTree, rows: Ints, rounds: int) -> f
     return sample.decisions.settle_round("filling", rounds, measure)
 
 
-def _onto_quadrics(sample: Sample, tree: cKDTree, rows: Ints, noise: Floats) -> Floats:
-    """Return the points of a tree, (m, 3), some of them, (k,) int, moved onto quadrics through their neighbors."""
+def _onto_quadrics(sample: Sample, tree: cKDTree, rows: Ints, noise: Floats) -> cKDTree:
+    """Return the points of a tree, some of them, (k,) int, moved onto quadrics through their neighbors."""
     smallest = sample.decisions.settle("smallest", lambda: int(np.bincount(sample.component).min()))
     points = tree.data.copy()
     points[rows] = project_points(tree, rows, noise, smallest)
-    return points
+    return cKDTree(points)
 
 
-def _moved(surface: Surface, points: Floats, moving: Bools) -> Surface:
-    """Return the surface of points at other places, (m, 3), some of which, (m,) bool, have moved."""
+def _moved(surface: Surface, tree: cKDTree, moving: Bools) -> Surface:
+    """Return the surface of the points at other places, a tree, to which some, (m,) bool, have moved."""
     nearest = surface.sample.nearest
     changed = moving | moving[nearest.index].any(axis=1)
-    nearest = nearest.with_quadrics(surface.mixed).renewed(points, changed)
+    nearest = nearest.with_quadrics(surface.mixed).renewed(tree, changed)
     moved = replace(surface.sample, nearest=look_across_rows(nearest))
     return fit_surface(moved, surface.sheets is not None, surface, changed)
 
@@ -403,7 +403,8 @@ def _regroup(sample: Sample, component: Ints) -> Sample:
         )
     scaled, changed, moved = sample.scaled.leave_out(~kept), sample.nearest.across(component), sample.moved[kept]
     component = component[kept]
-    nearest = look_across_rows(sample.nearest.renewed(move_apart(scaled.points, component) + moved, changed, kept))
+    tree = cKDTree(move_apart(scaled.points, component) + moved)
+    nearest = look_across_rows(sample.nearest.renewed(tree, changed, kept))
     return replace(
         sample,
         scaled=scaled,

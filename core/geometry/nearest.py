@@ -107,18 +107,18 @@ class Nearest:
         """Tell which points have neighbors of another component than their own, (m,) bool, by those, (m,) int."""
         return (component[self.index] != component[:, None]).any(axis=1)
 
-    def renewed(self, points: Floats, changed: Bools, kept: Bools | None = None) -> Nearest:
-        """Return the neighbors of the same points at other places, searched for only where they may be others.
+    def renewed(self, tree: cKDTree, changed: Bools, kept: Bools | None = None) -> Nearest:
+        """Return the neighbors of the same points at other places, a tree, searched for only where they may be others.
 
         Quadrics that are known stay so, and are fitted again there: around points in `changed`, (m,) bool, something
         has moved against them, or is gone. Places are those of all m points, or of those `kept`, (m,) bool.
         """
-        width = self.index.shape[1]
+        points, width = tree.data, self.index.shape[1]
         if len(points) < width:
             return find_nearest(points)
         kept = np.ones(len(self.index), dtype=bool) if kept is None else kept
         rows, row = np.flatnonzero(changed[kept]), (np.cumsum(kept) - 1).astype(np.int32)
-        tree, index, distance = cKDTree(points), row[self.index[kept]], self.distance[kept]
+        index, distance = row[self.index[kept]], self.distance[kept]
         distance[rows], index[rows] = tree.query(points[rows], k=width, workers=cores())
         result = Nearest(tree, index, distance, fading_weights(distance), self.in_row[kept] & ~changed[kept])
         if "quadrics" not in vars(self):

@@ -1,6 +1,7 @@
 """Stray points: a score of each point for how far it is off the surface, and the parts that gaps separate."""
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..types import Bools, Floats, Ints, Report
 from .components import even_reach, label_connected
@@ -125,7 +126,7 @@ def _heights(
 def without(nearest: Nearest, off: Bools) -> Nearest:
     """Return the neighbors of the points that are not off the surface, (m,) bool."""
     around: Bools = np.any(off[nearest.index], axis=1)
-    return look_across_rows(nearest.renewed(nearest.points[~off], around, ~off))
+    return look_across_rows(nearest.renewed(cKDTree(nearest.points[~off]), around, ~off))
 
 
 def label_parts(nearest: Nearest) -> Ints:
