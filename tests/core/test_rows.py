@@ -142,3 +142,30 @@ def test_a_curve_keeps_its_neighbors():
     nearest = find_nearest(circle())
     np.testing.assert_array_equal(look_across_rows(nearest).index, nearest.index)
     assert not np.any(look_across_rows(nearest).in_row)
+
+
+def test_neighbors_across_rows_are_the_nearest_in_each_direction():
+    """Those looked at first are enough for some points, and not for others."""
+    count, sides = 12, 900
+    points = rings(count, sides)[0]
+    points += 0.01 * np.random.default_rng(3).standard_normal(points.shape) * [1.0, 1.0, 0.0]
+    found = look_across_rows(find_nearest(points))
+    ring = np.repeat(np.arange(count), sides)
+    rows = np.arange(40, count * sides, 611)
+    assert found.in_row[rows].all()
+    for row in rows:
+        offset = points - points[row]
+        distance = np.linalg.norm(offset, axis=1)
+        order = np.argsort(distance)[1:656]
+        along = offset[order[7]]
+        beside = (ring[order] != ring[row]) & (
+            np.abs(offset[order] @ along) < 0.7 * distance[order] * distance[order[7]]
+        )
+        ahead = along / np.linalg.norm(along)
+        left = np.cross([0.0, 0.0, 1.0], ahead)
+        left *= np.sign(offset[order[beside.argmax()]] @ left)
+        angle = np.arctan2(offset[order] @ left, offset[order] @ ahead)
+        eighth = np.round(angle * 4.0 / np.pi) % 8
+        turn = np.array([np.count_nonzero(eighth[:place] == each) for place, each in enumerate(eighth)])
+        chosen = order[np.argsort(turn, kind="stable")[:40]]
+        assert set(found.index[row]) == {row, *chosen}
