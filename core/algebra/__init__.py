@@ -1,7 +1,7 @@
 """Linear algebra without geometry: blocks of rows, small dense systems, rotations, solvers, factors, eigenpairs."""
 
 from .anderson import Anderson
-from .blocks import blocks, by_blocks, on_all_cores, shares, workers
+from .blocks import blocks, by_blocks, on_all_cores, runs, shares, workers
 from .chebyshev import (
     chebyshev_coefficients,
     chebyshev_nodes,

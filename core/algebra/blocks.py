@@ -10,7 +10,7 @@ import numpy as np
 from threadpoolctl import OpenBLASController, get_cached_controller
 
 from ..cores import cores
-from ..types import Array, Report
+from ..types import Array, Ints, Report
 
 Part = TypeVar("Part")
 Result = TypeVar("Result")
@@ -33,6 +33,11 @@ def blocks(count: int, size: int) -> list[slice]:
 def shares(count: int, parts: int) -> list[slice]:
     """Return slices that divide a number of rows evenly into so many parts."""
     return [slice(count * part // parts, count * (part + 1) // parts) for part in range(parts)]
+
+
+def runs(start: Ints, count: Ints) -> Ints:
+    """Return the numbers of runs, one run after the other: so many from each start on, (count.sum(),)."""
+    return np.arange(count.sum()) + np.repeat(start - np.cumsum(count) + count, count)
 
 
 @contextmanager

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 from scipy import sparse
 
-from ..algebra import blocks, on_all_cores
+from ..algebra import blocks, on_all_cores, runs
 from ..geometry import arc_ahead, dots
 from ..operator import LaplaceBeltrami, tangent_frames
 from ..types import Array, Bools, Floats, Ints
@@ -129,8 +129,7 @@ class Fans:
 
     def _sides(self, rows: Ints) -> Ints:
         """Return the numbers of the sides of some fans."""
-        many = self._start[rows + 1] - self._start[rows]
-        return np.arange(many.sum()) + np.repeat(self._start[rows] - np.cumsum(many) + many, many)
+        return runs(self._start[rows], self._start[rows + 1] - self._start[rows])
 
     def _ahead(self, distance: Floats, label: Ints, side: Ints) -> Ints:
         """Return which of some triangles a front comes through, as far as paths along pairs tell."""

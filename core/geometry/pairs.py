@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from ..algebra import on_all_cores
+from ..algebra import on_all_cores, runs
 from ..kernel import SUPPORT
 from ..types import Array, Bools, Floats, Ints, Report
 from .patches import Patch, divide_pairs
@@ -126,7 +126,7 @@ def find_pairs(tree: cKDTree, lengths: Floats, report: Report = lambda: None) ->
 
     def put(part: tuple[Ints, Ints, Floats]) -> None:
         owner, column, length = part
-        place = np.arange(len(column)) + np.repeat(start[owner] - np.cumsum(many[owner]) + many[owner], many[owner])
+        place = runs(start[owner], many[owner])
         second[place], distance[place] = column, length
 
     on_all_cores(put, found)

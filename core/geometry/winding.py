@@ -8,7 +8,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..algebra import blocks, on_all_cores
+from ..algebra import blocks, on_all_cores, runs
 from ..linalg import eigh
 from ..types import Array, Floats, Ints
 from .nearest import Nearest, spacing_of
@@ -190,11 +190,10 @@ def _near_energies(fine: Any, coarse: Any, clump: Any) -> tuple[Array, ...]:
     def measure(part: slice) -> None:
         for low, high in pairwise(cuts[part.start : part.stop + 1]):
             one, near = first[low], second[low:high]
-            own, ends = slice(start[one], start[one] + size[one]), np.cumsum(size[near])
-            other = np.arange(ends[-1]) + np.repeat(start[near] + size[near] - ends, size[near])
+            own, other = slice(start[one], start[one] + size[one]), runs(start[near], size[near])
             middle = coarse[0][one]
             energy = _between(place[own] - middle, moment[own], place[other] - middle, moment[other], fine[4])
-            result[low:high] = np.add.reduceat(energy.sum(axis=0), ends - size[near])
+            result[low:high] = np.add.reduceat(energy.sum(axis=0), np.cumsum(size[near]) - size[near])
 
     on_all_cores(measure, blocks(len(cuts) - 1, _CLUMPS))
     return first, second, result

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
-from ..algebra import matrix_by_rows, on_all_cores
+from ..algebra import matrix_by_rows, on_all_cores, runs
 from ..geometry import Cloud, Pairs, Patch, ScaledPoints
 from ..kernel import SECOND_MOMENT, pair_kernel
 from ..types import Array, Bools, Floats, Ints
@@ -144,23 +144,26 @@ def _symmetric(scaled: ScaledPoints, half: sparse.csr_array, own: Array) -> spar
     The half, (m, m), holds each pair once. Points at the same place share its weights.
     """
     n, m = len(scaled.inverse), len(own)
-    if scaled.shared:
-        known = np.flatnonzero(scaled.inverse >= 0)
-        row = scaled.inverse[known]
-        spread = sparse.csr_array((1.0 / scaled.copies[row], (known, row)), shape=(n, m))
-        alone = sparse.diags_array(own, dtype=np.float64)  # np.bincount of nothing gives integers, even with weights
-        return (spread @ (half + half.T + alone) @ spread.T).tocsr()
     alone = sparse.csr_array((own, np.arange(m, dtype=np.int32), np.arange(m + 1, dtype=np.int32)), shape=(m, m))
-    parts, caller, counts = (half, half.T.tocsr(), alone), scaled.first.astype(np.int32), np.zeros(n, dtype=np.int32)
-    counts[caller] = sum(np.diff(part.indptr) - _zeros(part) for part in parts)
+    parts, counts = (half, half.T.tocsr(), alone), np.zeros(n, dtype=np.int32)
+    known = np.flatnonzero(scaled.inverse >= 0)
+    counts[known] = np.sum([_entries(part, scaled) for part in parts], axis=0)[scaled.inverse[known]]
+    # The caller's points, those at the same place one after the other.
+    caller = known[np.argsort(scaled.inverse[known], kind="stable")].astype(np.int32)
+    first = np.cumsum(scaled.copies) - scaled.copies
 
     def join(rows: slice) -> sparse.csr_array:
         place = scaled.inverse[rows]
         place = place[place >= 0]
         near = np.arange(3 * len(place)).reshape(3, -1).T.ravel()  # rows of the same point
         joined = sparse.vstack([part[place] for part in parts], format="csr")[near]
-        entries = joined.data, caller[joined.indices], joined.indptr[::3]
-        result = sparse.csr_array(entries, shape=(len(place), n))
+        values, columns, start = joined.data, joined.indices, joined.indptr[::3]
+        if scaled.shared:
+            times, row = scaled.copies[columns], np.repeat(place, np.diff(start))
+            values = np.repeat(values / (scaled.copies[row] * times), times)
+            columns = runs(first[columns], times)
+            start = np.append(0, np.cumsum(times))[start]
+        result = sparse.csr_array((values, caller[columns], start), shape=(len(place), n))
         result.sort_indices()
         result.eliminate_zeros()
         return result
@@ -168,7 +171,10 @@ def _symmetric(scaled: ScaledPoints, half: sparse.csr_array, own: Array) -> spar
     return matrix_by_rows(join, counts, n)
 
 
-def _zeros(matrix: sparse.csr_array) -> Ints:
-    """Return how many entries of each row are zero, such as those of pairs that are further along the surface."""
-    row = np.searchsorted(matrix.indptr, np.flatnonzero(matrix.data == 0.0), side="right") - 1
-    return np.bincount(row, minlength=matrix.shape[0])
+def _entries(matrix: sparse.csr_array, scaled: ScaledPoints) -> Ints:
+    """Return how many entries the rows have for the caller's points, (m,): zero ones, of pairs too far along, none."""
+    if not scaled.shared and matrix.data.all():
+        return np.diff(matrix.indptr)
+    counted = np.where(matrix.data == 0.0, 0, scaled.copies[matrix.indices])
+    counts: Ints = sparse.csr_array((counted, matrix.indices, matrix.indptr), shape=matrix.shape).sum(axis=1)
+    return counts

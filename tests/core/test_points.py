@@ -2,9 +2,10 @@ from functools import partial
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 import core
-from benchmarks.samplings import fibonacci_sphere, uneven_sphere
+from benchmarks.samplings import fibonacci_sphere, square_random, uneven_sphere
 from core.geometry.points import scale_points
 
 
@@ -188,6 +189,17 @@ class TestDuplicates:
         np.testing.assert_allclose(found[place][:600], expected, rtol=0.0, atol=1e-9)
         expected, found = (each.eigenpairs(12).eigenvalues for each in (single, doubled))
         np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-9)
+
+    def test_the_couplings_of_all_copies_sum_to_those_of_one_point(self):
+        """On an open surface, too, where images couple a point to itself."""
+        points, rng = square_random(700), np.random.default_rng(0)
+        copied = rng.permutation(np.append(np.arange(700), rng.integers(0, 700, 90)))
+        single, several = core.build_laplacian(points), core.build_laplacian(points[copied])
+        sums = sparse.csr_array((np.ones(len(copied)), (copied, np.arange(len(copied)))))
+        for expected, found in (single.stiffness, several.stiffness), (single.images, several.images):
+            assert found.has_canonical_format
+            assert np.all(found.data != 0.0)
+            np.testing.assert_allclose((sums @ found @ sums.T).toarray(), expected.toarray(), atol=1e-9)
 
 
 class TestGivenNormals:
