@@ -5,11 +5,9 @@ and the pair weight of the operator, ``-2 W_h'(r) / r``, is ``pair_kernel(r / h)
 """
 
 import functools
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import PchipInterpolator
 from scipy.special import j0
 
 from .types import Floats
@@ -69,16 +67,18 @@ def inverse_ratio(s: ArrayLike) -> Floats:
     resolved range, ``s(2.2) = 2.82``.
     """
     s = np.asarray(s, dtype=np.float64)
-    ratio, limit = _inverse_table()
-    return np.where(s <= limit, ratio(np.clip(s, 0.0, limit)), np.inf)
+    slope, limit = _slope_of_ratio()
+    within = np.clip(s, 0.0, limit)
+    return np.where(s <= limit, 1.0 + within * slope(within), np.inf)
 
 
 @functools.cache
-def _inverse_table() -> tuple[Any, float]:
-    t = np.linspace(0.0, RESOLVED, 513)
+def _slope_of_ratio() -> tuple[np.polynomial.Chebyshev, float]:
+    """Return ``(t^2 / s - 1) / s`` as a polynomial of s, as exact as the symbol is, and how far it holds."""
+    t = np.linspace(0.0, RESOLVED, 513)[1:]
     s = symbol(t)
-    ratio = np.concatenate([[1.0], t[1:] ** 2 / s[1:]])
-    return PchipInterpolator(s, ratio), s[-1]
+    slope = np.polynomial.Chebyshev.fit(s, (t**2 / s - 1.0) / s, 20, domain=[0.0, s[-1]], w=s)
+    return slope, s[-1]
 
 
 def _power(base: Floats, exponent: int) -> Floats:

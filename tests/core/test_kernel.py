@@ -64,7 +64,7 @@ def test_symbol_increases_over_the_resolved_range():
 
 def test_inverse_symbol():
     t = np.linspace(0.02, k.RESOLVED * (1.0 - 1e-9), 777)
-    np.testing.assert_allclose(k.symbol(t) * k.inverse_ratio(k.symbol(t)), t**2, rtol=1e-8)
+    np.testing.assert_allclose(k.symbol(t) * k.inverse_ratio(k.symbol(t)), t**2, rtol=1e-10)
 
 
 def test_inverse_symbol_at_its_ends():
