@@ -12,6 +12,7 @@ from . import spectral as spectral
 from . import splats as splats
 from . import surface as surface
 from . import tiles as tiles
+from .arguments import check_points as check_points
 from .errors import AreaError as AreaError
 from .errors import BrokenLibraryError as BrokenLibraryError
 from .errors import Cancelled as Cancelled
@@ -26,7 +27,6 @@ from .errors import UnresolvedModesError as UnresolvedModesError
 from .example import example_sphere as example_sphere
 from .geometry import Agreed as Agreed
 from .geometry import Doubt as Doubt
-from .geometry import check_points as check_points
 from .geometry import estimate_normals as estimate_normals
 from .geometry import orient_normals as orient_normals
 from .memory import check_room as check_room

@@ -8,12 +8,13 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .errors import InvalidPointsError, PointCloudError
+from .errors import InvalidPointsError, PointCloudError, TooFewPointsError
 from .types import Array, FilePath, Floats
 
 Shape: TypeAlias = tuple[int | None, ...]
 
 _HUGE = 1e100  # of a coordinate, so that no product overflows
+_LARGEST = 1e60  # coordinates [L] of points, and its inverse the least extent: powers of lengths must be numbers, too
 
 
 def real(given: Any) -> float:
@@ -143,3 +144,53 @@ def check_plane(point: ArrayLike, normal: ArrayLike) -> tuple[Floats, Floats]:
         raise InvalidPointsError("The normal of the plane has length 0. Give a vector across the plane.")
     across = found[1] / size
     return found[0], across / np.linalg.norm(across)
+
+
+def check_points(points: ArrayLike) -> Floats:
+    """Check coordinates and return them in double precision.
+
+    Parameters
+    ----------
+    points : array_like, (n, 3)
+        Coordinates [L]. Integers are taken as numbers; the precision of float32 input is judged as such.
+
+    Returns
+    -------
+    ndarray, (n, 3) float64
+        A copy only where the type changes.
+
+    Raises
+    ------
+    InvalidPointsError
+        Not (n, 3) real numbers, not finite, or so far from the origin that their type does not resolve them.
+    TooFewPointsError
+        No points at all.
+    """
+    given = as_array(points, "Points")
+    if given.ndim != 2 or given.shape[1] != 3:
+        raise InvalidPointsError(f"Points must have the shape (n, 3), not {given.shape}. Give x, y, z for each point.")
+    if given.dtype.kind not in "iuf":
+        raise InvalidPointsError(f"Points must be real numbers, not {given.dtype}. Convert them to float64.")
+    if len(given) == 0:
+        raise TooFewPointsError("There are no points. Add points.")
+    result = as_doubles(given, copy=False)
+    check_finite(result, "points", "Delete these points.")
+    largest = np.abs(result).max()
+    if largest > _LARGEST:
+        raise InvalidPointsError(
+            f"Some of the {len(result)} points lie {largest:.3g} from the origin: squared lengths would"
+            f" overflow. Delete these points, or scale the points to less than {_LARGEST:g}."
+        )
+    extent = np.ptp(result, axis=0).max()
+    if 0.0 < extent < 1.0 / _LARGEST:
+        raise InvalidPointsError(
+            f"The {len(result)} points span only {extent:.3g}: squared lengths would underflow."
+            f" Scale the points to more than {1.0 / _LARGEST:g}."
+        )
+    if len(result) > 1 and given.dtype.kind == "f" and extent < 8192.0 * np.finfo(given.dtype).eps * largest:
+        raise InvalidPointsError(
+            f"The {len(result)} points lie {largest:.3g} from the origin but span only {extent:.3g}:"
+            f" {given.dtype} coordinates do not resolve them there. Shift them to the origin before they are"
+            " stored."
+        )
+    return result

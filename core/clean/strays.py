@@ -3,11 +3,10 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import positive, real, whole
+from ..arguments import check_points, positive, real, whole
 from ..errors import PointCloudError
 from ..geometry import (
     PARTS,
-    check_points,
     find_nearest,
     label_parts,
     look_across_rows,

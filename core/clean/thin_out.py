@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from ..arguments import check_switches, real, whole
+from ..arguments import check_points, check_switches, real, whole
 from ..cores import cores
 from ..errors import InvalidPointsError, PointCloudError
-from ..geometry import NEIGHBORS, apart, check_points, nearest_in_blocks
+from ..geometry import NEIGHBORS, apart, nearest_in_blocks
 from ..linalg import eigvalsh
 from ..progress import ends_at_one
 from ..types import Floats, Ints, Progress, Report

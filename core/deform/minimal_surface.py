@@ -10,10 +10,10 @@ from scipy.sparse.linalg import LinearOperator
 from scipy.spatial import cKDTree
 
 from ..algebra import Iterate, conjugate_gradients, multigrid
-from ..arguments import real, whole
+from ..arguments import check_points, real, whole
 from ..errors import Cancelled, InvalidPointsError, NotASurfaceError, PointCloudError
 from ..frozen import Frozen
-from ..geometry import FEWEST, as_mask, check_points, find_nearest
+from ..geometry import FEWEST, as_mask, find_nearest
 from ..operator import LaplaceBeltrami, build_laplacian
 from ..options import LaplacianOptions, check_options
 from ..progress import ends_at_one

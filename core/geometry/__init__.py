@@ -45,7 +45,7 @@ from .normals import near_edges, side_sums, sides_by_sums, signs_by_sums, unit_n
 from .orientation import orient_normals, toward
 from .pairs import Pairs
 from .patches import Patch
-from .points import FEWEST, as_indices, as_mask, check_points, check_values, order_of, scale_points
+from .points import FEWEST, as_indices, as_mask, check_values, order_of, scale_points
 from .prolongation import Prolongation, balanced_weights
 from .quadrics import CURVED, MANY, check_surface, count_curves, frames, lengthened, roundness
 from .rounding import find_rounding, smooth_rounded

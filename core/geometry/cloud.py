@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from ..algebra import workers
+from ..arguments import check_points
 from ..errors import ComponentError, TooFewPointsError
 from ..frozen import Frozen
 from ..options import LaplacianOptions, check_options
@@ -34,7 +35,6 @@ from .points import (
     as_mask,
     check_boundary,
     check_distances,
-    check_points,
     scale_points,
 )
 from .quadrics import MANY, Quadrics, check_surface, count_curves, frames

@@ -5,14 +5,13 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.spatial import ConvexHull
 
-from ..arguments import as_array, as_doubles, check_array, check_finite
+from ..arguments import as_array, as_doubles, check_array, check_finite, check_points
 from ..errors import InvalidPointsError
 from ..options import LaplacianOptions
 from ..types import Array, Bools, Floats, Ints
 from .cloud import read_surface
 from .nearest import Nearest
 from .normals import orient_outwards, propagate_signs, unit_normals
-from .points import check_points
 from .winding import coupling, divide_patches, winding_signs
 
 METHODS = ("outside", "viewpoint", "winding")

@@ -17,57 +17,6 @@ from .scaled import ScaledPoints
 FEWEST = 5  # points of a boundary that is given
 FEWEST_OF_SURFACE = 7  # different points: each has as many others as a quadric has coefficients
 _SAME = 1e-9  # of the scale: closer points count as one, as areas between them would drown in rounding
-_LARGEST = 1e60  # coordinates [L], and its inverse the least extent: further powers of lengths must be numbers, too
-
-
-def check_points(points: ArrayLike) -> Floats:
-    """Check coordinates and return them in double precision.
-
-    Parameters
-    ----------
-    points : array_like, (n, 3)
-        Coordinates [L]. Integers are taken as numbers; the precision of float32 input is judged as such.
-
-    Returns
-    -------
-    ndarray, (n, 3) float64
-        A copy only where the type changes.
-
-    Raises
-    ------
-    InvalidPointsError
-        Not (n, 3) real numbers, not finite, or so far from the origin that their type does not resolve them.
-    TooFewPointsError
-        No points at all.
-    """
-    given = as_array(points, "Points")
-    if given.ndim != 2 or given.shape[1] != 3:
-        raise InvalidPointsError(f"Points must have the shape (n, 3), not {given.shape}. Give x, y, z for each point.")
-    if given.dtype.kind not in "iuf":
-        raise InvalidPointsError(f"Points must be real numbers, not {given.dtype}. Convert them to float64.")
-    if len(given) == 0:
-        raise TooFewPointsError("There are no points. Add points.")
-    result = as_doubles(given, copy=False)
-    check_finite(result, "points", "Delete these points.")
-    largest = np.abs(result).max()
-    if largest > _LARGEST:
-        raise InvalidPointsError(
-            f"Some of the {len(result)} points lie {largest:.3g} from the origin: squared lengths would"
-            f" overflow. Delete these points, or scale the points to less than {_LARGEST:g}."
-        )
-    extent = np.ptp(result, axis=0).max()
-    if 0.0 < extent < 1.0 / _LARGEST:
-        raise InvalidPointsError(
-            f"The {len(result)} points span only {extent:.3g}: squared lengths would underflow."
-            f" Scale the points to more than {1.0 / _LARGEST:g}."
-        )
-    if len(result) > 1 and given.dtype.kind == "f" and extent < 8192.0 * np.finfo(given.dtype).eps * largest:
-        raise InvalidPointsError(
-            f"The {len(result)} points lie {largest:.3g} from the origin but span only {extent:.3g}:"
-            f" {given.dtype} coordinates do not resolve them there. Shift them to the origin before they are"
-            " stored."
-        )
-    return result
 
 
 def scale_points(points: Floats, decisions: Decisions | None = None) -> ScaledPoints:

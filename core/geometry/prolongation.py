@@ -6,11 +6,11 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from ..algebra import blocks, eliminate, on_all_cores
-from ..arguments import as_array
+from ..arguments import as_array, check_points
 from ..errors import InvalidPointsError
 from ..types import Array, Floats, Ints, Report
 from .nearest import SMOOTH
-from .points import as_mask, check_points, check_values
+from .points import as_mask, check_values
 from .quadrics import frames
 from .subset import voxel_numbers
 

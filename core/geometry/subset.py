@@ -6,11 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from ..arguments import whole
+from ..arguments import check_points, whole
 from ..cores import cores
 from ..errors import InvalidPointsError
 from ..types import Array, Bools, Floats, Ints, Report
-from .points import check_points
 
 _CANDIDATES = 3.0  # voxels for each point wanted: enough to choose from, few enough for their pairs
 FINEST = 2**21 - 1  # voxels along each axis: three numbers of 21 bits share one of 64

@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from ..algebra import nearest_rotations
-from ..arguments import check_array, check_finite, check_positions, check_switches, real
+from ..arguments import check_array, check_finite, check_points, check_positions, check_switches, real
 from ..cores import cores
 from ..errors import InvalidPointsError, PointCloudError
-from ..geometry import SMOOTH, check_points, read_surface
+from ..geometry import SMOOTH, read_surface
 from ..linalg import det, eigh, eigvalsh, inv, svd
 from ..options import LaplacianOptions
 from ..progress import ends_at_one

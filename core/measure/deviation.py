@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from ..arguments import real
+from ..arguments import check_points, real
 from ..cores import cores
 from ..errors import PointCloudError
-from ..geometry import Doubt, check_points, check_values, side_sums, sides_by_sums, unit_normals
+from ..geometry import Doubt, check_values, side_sums, sides_by_sums, unit_normals
 from ..operator import ImplicitSurface, LaplaceBeltrami
 from ..progress import ends_at_one
 from ..types import Bools, Floats, Progress, Report

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from ..algebra import workers
-from ..arguments import check_switches, positive
+from ..arguments import check_points, check_switches, positive
 from ..errors import InvalidPointsError
 from ..frozen import Frozen
 from ..geometry import (
@@ -18,7 +18,6 @@ from ..geometry import (
     Cloud,
     Doubt,
     arc_length,
-    check_points,
     check_values,
     move_apart,
     read_cloud,

@@ -7,7 +7,8 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from ..algebra import on_all_cores
-from ..geometry import Cloud, Pairs, Patch, check_points, pair_heights, read_cloud, toward
+from ..arguments import check_points
+from ..geometry import Cloud, Pairs, Patch, pair_heights, read_cloud, toward
 from ..kernel import pair_kernel
 from ..memory import check_memory
 from ..operator import KernelMatrix, LaplaceBeltrami, Stiffness, laplacian_of, stiffness_matrix

@@ -7,10 +7,10 @@ from numpy.typing import ArrayLike
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
-from ..arguments import real
+from ..arguments import check_points, real
 from ..errors import InvalidPointsError, PointCloudError
 from ..frozen import Frozen
-from ..geometry import check_points, check_values
+from ..geometry import check_values
 from ..linalg import svd
 from ..operator import Spectrum
 from ..types import Floats, Ints

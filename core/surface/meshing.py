@@ -10,11 +10,11 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..arguments import positive
+from ..arguments import check_points, positive
 from ..cores import cores
 from ..errors import NotEnoughMemoryError, TooFewPointsError
 from ..frozen import Frozen
-from ..geometry import Prolongation, check_points
+from ..geometry import Prolongation
 from ..memory import available_memory
 from ..operator import ImplicitSurface, LaplaceBeltrami
 from ..progress import ends_at_one

@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from ..arguments import as_path
+from ..arguments import as_path, check_points
 from ..errors import InvalidPointsError, NotEnoughMemoryError, PointCloudError, TooFewPointsError
 from ..files import alone_in, writing
-from ..geometry import check_points
 from ..memory import needed_memory
 from ..options import LaplacianOptions
 from ..types import Array, FilePath, Floats

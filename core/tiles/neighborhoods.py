@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..arguments import check_points
 from ..geometry import (
     COUNT,
     FILLING,
@@ -15,7 +16,6 @@ from ..geometry import (
     Sample,
     ScaledPoints,
     Surface,
-    check_points,
     check_surface,
     choose_bridges,
     count_curves,

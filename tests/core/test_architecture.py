@@ -45,7 +45,7 @@ def taken(path):
 
 ABOVE = "tools", "command", "operators", "ui"
 BLENDER_SIDE = sorted(path for package in ABOVE for path in (ROOT / package).rglob("*.py"))
-LIGHT = ("errors", "files", "linalg", "memory", "options")  # modules and packages of core without scipy
+LIGHT = ("arguments", "errors", "files", "linalg", "memory", "options")  # modules and packages of core without scipy
 
 
 @pytest.mark.parametrize(
