@@ -9,7 +9,7 @@ from ..arguments import as_array, as_doubles, check_array, check_positions
 from ..cores import cores
 from ..geometry import Discs, frames
 from ..linalg import solve
-from ..types import Floats
+from ..types import Floats, Progress
 
 _COUNT = 12  # neighbors: two rings of an even sample
 _ROUND = 0.01  # of `lifted_inverse`
@@ -61,26 +61,30 @@ class Slopes:
 
     def __init__(self, points: ArrayLike, discs: Discs) -> None:
         given = as_array(points, "Points")
-        self._points = check_positions(given, len(given) if given.ndim else 0, "points", "point")
-        self._points -= self._points.mean(axis=0) if len(self._points) else 0.0
-        self._discs = discs
-        found = range(1, min(_COUNT, max(len(self._points) - 1, 0)) + 2)  # the point itself first
+        given = check_positions(given, len(given) if given.ndim else 0, "points", "point")
+        given -= given.mean(axis=0) if len(given) else 0.0
+        # In the order of a tree, in which neighbors lie near each other in memory, too.
+        self._order = cKDTree(given).indices.copy()
+        self._points, self._discs = given[self._order], Discs(discs.normals[self._order], discs.radii[self._order])
+        found = range(1, min(_COUNT, max(len(given) - 1, 0)) + 2)  # the point itself first
         self._near = cKDTree(self._points).query(self._points, k=found, workers=cores())[1].astype(np.int32)
 
-    def of(self, values: ArrayLike) -> Floats:
+    def of(self, values: ArrayLike, *, progress: Progress | None = None) -> Floats:
         """Return the slopes of values, (n,), as vectors in the tangent planes, (n, 3) [1/L].
 
-        Values that are not finite count as unknown, and have none.
+        Values that are not finite count as unknown, and have none. `progress`, if given, is called now and then as
+        ``progress(stage, fraction)``; it may raise `Cancelled`.
         """
         count = len(self._points)
         advice = f"Give one real number for each of {count} points."
-        given = as_doubles(check_array(values, "Values", [(count,)], advice, "iufb"))
-        slopes = np.zeros(self._points.shape)
+        given = as_doubles(check_array(values, "Values", [(count,)], advice, "iufb"))[self._order]
+        slopes = np.empty(self._points.shape)
 
         def find(rows: slice) -> None:
-            slopes[rows] = self._found(rows, given)
+            slopes[self._order[rows]] = self._found(rows, given)
 
-        on_all_cores(find, blocks(count, _BLOCK))
+        report = progress or (lambda stage, fraction: None)
+        on_all_cores(find, blocks(count, _BLOCK), lambda: report("Slopes", 0.0))
         return slopes
 
     def _found(self, rows: slice, values: Floats) -> Floats:
