@@ -17,7 +17,7 @@ def _modules():
     from .operators.deform import tools as deform
     from .operators.files import command, exporting, importing, show_splats, tiles
     from .operators.objects import counting, motion, motion_files, notices, settings
-    from .operators.running import cache, discs, job
+    from .operators.running import cache, job, later
     from .ui import (
         advanced,
         applications,
@@ -49,7 +49,7 @@ def _modules():
         motion,
         motion_files,
         job,
-        discs,
+        later,
         *_within(tools),
         handle_kind,
         deform,

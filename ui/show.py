@@ -185,12 +185,19 @@ def _note_groups(*_):
 
 
 @persistent
-def _keep_groups(*_):
-    """Restore Group Colors in Edit Mode, where undo is for changes of points."""
-    for obj in bpy.data.objects:
-        shown = _noted.get(obj.session_uid, obj.meshfree.show_groups)
-        if obj.meshfree.show_groups != shown:
-            obj.meshfree.show_groups = shown
+def _follow_undo(*_):
+    """Restore Group Colors in Edit Mode, where undo is for changes of points; find again what had come later."""
+    for obj in [obj for obj in bpy.data.objects if obj.is_editable and obj.data is not None and obj.data.is_editable]:
+        kept = obj.meshfree
+        shown = _noted.get(obj.session_uid, kept.show_groups)
+        if kept.show_groups != shown:
+            kept.show_groups = shown
+        if kept.slopes_later:
+            recolor(obj)
+        else:
+            smooth.forget(obj)
+        if obj.mode == "OBJECT" and kept.discs_of not in ("", kept.spacing_of):
+            renew_discs(obj, kept.spacing_of)
     _noted.clear()
 
 
@@ -607,9 +614,9 @@ _HANDLERS = {
     "views_changed": redraw_views,
     "panels_changed": redraw_panels,
     "undo_pre": _note_groups,
-    "undo_post": _keep_groups,
+    "undo_post": _follow_undo,
     "redo_pre": _note_groups,
-    "redo_post": _keep_groups,
+    "redo_post": _follow_undo,
     "depsgraph_update_post": _objects_changed,
 }
 

@@ -1,6 +1,7 @@
 """Surface gradients of displayed values, by which colours are interpolated within discs."""
 
 import zlib
+from functools import partial
 
 import numpy as np
 
@@ -16,19 +17,23 @@ from ..operators.objects.attributes import (
     remove_attributes,
     write_attribute,
 )
+from ..operators.objects.handlers import notify
 from ..operators.objects.reading import sharing_objects
 from ..operators.running import cache
+from ..operators.running.later import drop, later
 
+_KIND = "Slopes"  # of what is found later
 _BOUNDS = -3e38, 3e38  # of single precision: larger gradients are clipped
 
 
 def follow(obj, name, part, columns, spacing):
-    """Write the gradients of an object's displayed values, if there are discs that can show them.
+    """Write the gradients of an object's displayed values, if there are discs that can show them; of many points later.
 
     Name and part are those on display; columns are the numbers, one or two for each point, empty where they have no
     gradient. The spacing of the points is the length in which discs are kept.
     """
     kept, data = obj.meshfree, obj.data
+    forget(obj)
     if not _is_writable(data):  # as in Edit Mode: earlier gradients are valid for the same attribute
         kept.slopes_of = kept.slopes_of if columns and kept.slopes_of.startswith(f"{part} {name} ") else ""
         return
@@ -39,17 +44,46 @@ def follow(obj, name, part, columns, spacing):
             remove_attributes(data, SLOPE, SLOPE_2, SLOPE_OF)
         return
     discs = read_attribute(data, DISC)
-    wanted = f"{part} {name} {_checksum(points, discs, *columns)} {spacing:.6g}"
+    seen = _checksum(points, discs)
+    wanted = f"{part} {name} {seen} {_checksum(*columns)} {spacing:.6g}"
     holders = [other for other in (obj, *sharing_objects(obj)) if other.meshfree.slopes_of == wanted]
-    if not holders or SLOPE not in data.attributes:
+    kept.slopes_of = wanted if holders and SLOPE in data.attributes else ""
+    if kept.slopes_of:
+        return
+
+    def compute(progress):
         slopes = cache.fetch(cache.content("slopes", points, discs, spacing), lambda: _slopes(points, discs, spacing))
-        remove_attributes(data, *(SLOPE, SLOPE_2)[len(columns) :])
-        for kind, values in zip((SLOPE, SLOPE_2), columns, strict=False):
-            write_attribute(data, kind, np.clip(slopes.of(values), *_BOUNDS))
-        write_attribute(data, SLOPE_OF, _as_number(read_attribute(data, name)))
-        for other in sharing_objects(obj):
-            other.meshfree.slopes_of = ""
-    kept.slopes_of = wanted
+        return [np.clip(slopes.of(values, progress=progress), *_BOUNDS) for values in columns]
+
+    values = _as_number(read_attribute(data, name))
+    kept.slopes_later = True
+    later(_KIND, obj, compute, partial(_take, seen, wanted, values))
+
+
+def forget(obj):
+    """Drop gradients that are still to be found."""
+    drop(_KIND, obj)
+    if obj.meshfree.slopes_later:
+        obj.meshfree.slopes_later = False
+
+
+def _take(seen, wanted, values, obj, job):
+    """Write gradients of values, unless points or discs, of which a checksum is known, have changed since."""
+    data = obj.data
+    if not _is_writable(data):
+        obj.meshfree.colors_behind = True  # until Edit Mode is left
+        return
+    if not has_vectors(data, DISC) or _checksum(own_positions(data), read_attribute(data, DISC)) != seen:
+        return
+    gradients = job.result()
+    remove_attributes(data, *(SLOPE, SLOPE_2)[len(gradients) :])
+    for kind, gradient in zip((SLOPE, SLOPE_2), gradients, strict=False):
+        write_attribute(data, kind, gradient)
+    write_attribute(data, SLOPE_OF, values)
+    for other in sharing_objects(obj):
+        other.meshfree.slopes_of = ""
+    obj.meshfree.slopes_of, obj.meshfree.slopes_later = wanted, False
+    notify("shape_changed", obj)
 
 
 def _is_writable(data):

@@ -259,6 +259,7 @@ class MESHFREE_PG_settings(with_properties(LAPLACIAN.values()), bpy.types.Proper
         name="Shown Before", description="What was shown before stray points were; empty for no display"
     )
     slopes_of: StringProperty(name="Slopes of", description="What is shown with slopes, and its checksum")
+    slopes_later: BoolProperty(name="Slopes Later", description="Whether slopes of what is shown are still to be found")
     spacing_of: StringProperty(name="Spacing of", description="Checksum of the points whose spacing was measured")
     discs_of: StringProperty(name="Discs of", description="Checksum of the points whose discs were found")
     colors_behind: BoolProperty(

@@ -1,10 +1,8 @@
 """The discs of the display after points were moved, added or deleted."""
 
-from typing import NamedTuple
+from functools import partial
 
-import bpy
 import numpy as np
-from bpy.app.handlers import persistent
 
 from ... import core
 from ...core import PointCloudError
@@ -16,23 +14,10 @@ from ..objects.attributes import (
     remove_attributes,
 )
 from ..objects.carried import discs_at_rest, write_discs
-from ..objects.handlers import add_handlers, notify, remove_handlers
-from ..objects.reading import discs, find_object
+from ..objects.handlers import notify
+from ..objects.reading import discs
 from . import cache
-from .job import Job
-
-_AT_ONCE = 20_000  # points whose discs a window waits for
-_TICK = 0.1  # seconds between two looks at threads
-
-
-class _Work(NamedTuple):
-    """A search for discs: the checksum of the points, and its job."""
-
-    points: str
-    job: Job
-
-
-_threads = {}  # work by the session_uid of its object
+from .later import later
 
 
 def disc_finder(obj):
@@ -71,52 +56,15 @@ def renew_discs(obj, points):
     if DISC not in data.attributes or obj.meshfree.discs_of in ("", points):  # empty where it is not known
         return
     local, sides = own_positions(data).astype(np.float64), read_attribute(data, DISC).astype(np.float64)
-    work = _Work(points, Job("Discs", [], lambda progress: _found(local, sides, progress)))
-    if bpy.app.background or len(local) <= _AT_ONCE:
-        work.job.wait(None)
-        _take(obj, work)
-        return
-    if obj.session_uid in _threads:
-        _threads[obj.session_uid].job.stop()
-    _threads[obj.session_uid] = work
-    if not bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.register(_tick, first_interval=_TICK)
+    later("Discs", obj, lambda progress: _found(local, sides, progress), partial(_take, points))
 
 
-def _take(obj, work):
+def _take(points, obj, job):
     """Write the discs that were found, unless the points have changed since."""
-    if obj is None or obj.mode != "OBJECT" or points_checksum(obj.data) != work.points:
+    if obj.mode != "OBJECT" or points_checksum(obj.data) != points:
         return
     try:
-        write_discs(obj, work.job.result())
+        write_discs(obj, job.result())
     except PointCloudError:  # such as of a line, or of too few
         remove_attributes(obj.data, DISC)
     notify("shape_changed", obj)
-
-
-def _tick():
-    """Take what threads have found; a timer of the window."""
-    for uid, work in [*_threads.items()]:
-        if work.job.ended:
-            del _threads[uid]
-            _take(find_object(uid), work)
-    return _TICK if _threads else None
-
-
-@persistent
-def _forget(*_):
-    while _threads:
-        _threads.popitem()[1].job.stop()
-
-
-def attach():
-    """Drop what threads find when another file is opened."""
-    add_handlers({"load_pre": _forget})
-
-
-def detach():
-    """Stop threads and timer."""
-    remove_handlers({"load_pre": _forget})
-    _forget()
-    if bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.unregister(_tick)

@@ -29,6 +29,7 @@ KEPT = {
     "discs_of",
     "shown_before",
     "slopes_of",
+    "slopes_later",
     "colors_behind",
     "deform",
     "stages",

@@ -46,6 +46,26 @@ def test_discs_follow_thinning(gui, count):
     gui.wait_until(FRESH)
 
 
+def test_discs_are_there_again_after_undo(gui):
+    with_surface(gui, 30_000)
+    gui.python("""
+import numpy as np
+mesh = bpy.context.object.data
+places = np.empty(90_000, dtype=np.float32)
+mesh.attributes["position"].data.foreach_get("vector", places)
+mesh.attributes["position"].data.foreach_set("vector", (places.reshape(-1, 3) * [1.0, 1.0, 0.5]).reshape(-1))
+mesh.update()
+bpy.context.view_layer.update()
+bpy.ops.ed.undo_push(message="Flatter")
+""")
+    gui.wait_until(FRESH)
+    gui.python("bpy.context.object.location.x += 0.1; bpy.ops.ed.undo_push(message='Moved')")
+    gui.point_at_view()
+    gui.key("ctrl+z")
+    gui.wait_until("bpy.context.object.location.x < 0.05")
+    gui.wait_until(FRESH)
+
+
 def test_discs_follow_edit_mode(gui):
     with_surface(gui, 3000)
     edit(gui)
@@ -55,6 +75,50 @@ def test_discs_follow_edit_mode(gui):
     gui.wait_until("bpy.context.object.mode == 'OBJECT'")
     assert gui.python(COUNT) < 3000
     gui.wait_until(FRESH)
+
+
+@pytest.fixture
+def smoothing(gui, request):
+    """The window with so many points that show their places along X; `smooth` tells if they do so within discs."""
+    with_surface(gui, request.param)
+    gui.python("bpy.ops.meshfree.colormap(attribute='position'); shown = bpy.context.object.meshfree")
+    gui.python("smooth = lambda axis: bpy.context.object.meshfree.slopes_of.startswith(f'{axis} position ')")
+    gui.python("shown.component = 'X'")
+    gui.wait_until("smooth('X') and '.lb_slope' in bpy.context.object.data.attributes")
+    return gui
+
+
+@pytest.mark.parametrize(("smoothing", "at_once"), [(3000, True), (30_000, False)], indirect=["smoothing"])
+def test_colors_within_discs_of_many_points_come_later_and_are_saved(smoothing, at_once):
+    gui = smoothing
+    assert gui.python("shown.component = 'Y'; smooth('Y')") == at_once  # no timer has run in between
+    gui.wait_until("smooth('Y')")
+    path = str(gui.place.inside(gui.folder / "shown.blend"))
+    gui.python(f"shown.component = 'Z'; bpy.ops.wm.save_as_mainfile(filepath={path!r}, copy=True)")
+    assert gui.python("smooth('Z')")
+    gui.python("shown.component = 'X'; shown.component = 'Y'")  # what is not wanted any more is dropped
+    gui.wait_until("smooth('Y')")
+
+
+@pytest.mark.parametrize("smoothing", [3000, 30_000], indirect=True)
+def test_colors_within_discs_are_there_again_after_undo(smoothing):
+    gui = smoothing
+    gui.python("shown.component = 'Y'; bpy.ops.ed.undo_push(message='Y')")
+    gui.wait_until("smooth('Y')")
+    gui.python("bpy.context.object.location.x += 0.1; bpy.ops.ed.undo_push(message='Moved')")
+    gui.point_at_view()
+    gui.key("ctrl+z")
+    gui.wait_until("bpy.context.object.location.x < 0.05")
+    gui.wait_until("smooth('Y') and not bpy.context.object.meshfree.slopes_later")
+
+
+@pytest.mark.parametrize("smoothing", [30_000], indirect=True)
+def test_colors_within_discs_that_come_in_edit_mode_are_there_after_it(smoothing):
+    gui = smoothing
+    gui.python("shown.component = 'Y'; bpy.ops.object.mode_set(mode='EDIT')")
+    gui.wait_until("shown.colors_behind")
+    gui.python("bpy.ops.object.mode_set(mode='OBJECT')")
+    gui.wait_until("smooth('Y') and not shown.colors_behind")
 
 
 def test_a_deleted_object_goes(gui):
