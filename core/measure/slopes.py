@@ -9,6 +9,7 @@ from ..arguments import as_array, as_doubles, check_array, check_positions
 from ..cores import cores
 from ..geometry import Discs, frames
 from ..linalg import solve
+from ..progress import ends_at_one
 from ..types import Floats, Progress
 
 _COUNT = 12  # neighbors: two rings of an even sample
@@ -69,6 +70,7 @@ class Slopes:
         found = range(1, min(_COUNT, max(len(given) - 1, 0)) + 2)  # the point itself first
         self._near = cKDTree(self._points).query(self._points, k=found, workers=cores())[1].astype(np.int32)
 
+    @ends_at_one
     def of(self, values: ArrayLike, *, progress: Progress | None = None) -> Floats:
         """Return the slopes of values, (n,), as vectors in the tangent planes, (n, 3) [1/L].
 
@@ -83,8 +85,9 @@ class Slopes:
         def find(rows: slice) -> None:
             slopes[self._order[rows]] = self._found(rows, given)
 
-        report = progress or (lambda stage, fraction: None)
-        on_all_cores(find, blocks(count, _BLOCK), lambda: report("Slopes", 0.0))
+        report, parts = progress or (lambda stage, fraction: None), blocks(count, _BLOCK)
+        done = iter(np.linspace(0.0, 1.0, len(parts) + 1))
+        on_all_cores(find, parts, lambda: report("Slopes", next(done)))
         return slopes
 
     def _found(self, rows: slice, values: Floats) -> Floats:

@@ -44,6 +44,9 @@ CALLS = {
     "volume": lambda laplacian, **given: core.measure.enclosed_volume(laplacian, **given),
     "poisson": lambda laplacian, **given: core.distance.solve_poisson(laplacian, laplacian.points[:, 0], **given),
     "paper": lambda laplacian, **given: core.paper.build_laplacian(laplacian.points, **given),
+    "slopes": lambda laplacian, **given: core.measure.Slopes(
+        laplacian.points, core.surface.surface_discs(laplacian.points)
+    ).of(laplacian.points[:, 0], **given),
     "discs": lambda laplacian, **given: core.surface.surface_discs(laplacian.points, **given),
 }
 
