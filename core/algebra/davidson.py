@@ -23,12 +23,13 @@ _COARSE = 1e-2  # residual on coarse levels: a smaller one would not improve the
 _CYCLES = 4  # V-cycles in a Davidson step, at most
 _FALL = 3.5  # factor by which a V-cycle reduces the residual, about
 _CYCLED = 0.4, 1.2  # eigenvalues of the matrix times a V-cycle, nearly all: the smoother overshoots by .17
-_STEPS, _COARSE_STEPS = 24, 8  # at most; two to six are usual on the points, two on coarse levels
+_STEPS, _COARSE_STEPS = 48, 8  # at most; two to six are usual on the points, two on coarse levels
 _COLUMNS = 40  # in a V-cycle at one time, at least: with 20, products take a quarter more time; with 72, an eighth less
 _ENTRIES = 1 << 24  # of these columns, up to which there may be more: of 200,000 points all of 50 modes
 _BLOCK = 1 << 11  # rows of vectors worked on at one time
 _PART = 1 << 18  # entries of vectors that are scaled and added at one time
 _PATIENCE = 12  # steps after which the block of vectors is widened, where it stalls
+_STALLED = 4  # steps in which residuals fall to no half
 
 
 def coarse_to_fine(
@@ -135,11 +136,12 @@ def refine(
         All residuals reached their goals.
     """
     level, count, worst = levels[0], vectors.shape[1], 0.0
-    before = excess = np.inf
+    history: list[float] = []  # of the residual over its goal, at the worst
     drift = np.inf  # bound on the rounding error of `residual`, updated step by step; 0 for an exact product
     for step in range(limit + 1):
-        if final and step % _PATIENCE == _PATIENCE - 1 and excess > max(1.0, 0.5 * before):
-            # It stalls: the block may cut an eigenspace in two. Widen it.
+        stalls = len(history) > _STALLED and history[-1] > max(1.0, 0.5 * history[-1 - _STALLED])
+        if final and step % _PATIENCE == _PATIENCE - 1 and stalls:
+            # The block may cut an eigenspace in two. Widen it.
             vectors = np.column_stack([vectors, _random(len(vectors), _RANDOM + count // 8, step)])
             drift, count = np.inf, vectors.shape[1]
         if drift > 0.1 * tolerance:
@@ -161,7 +163,8 @@ def refine(
         goals[:wanted] = tolerance
         if values[wanted - 1] <= tolerance * measure:  # none is lower than zero, as of many components
             goals[wanted:] = np.inf
-        before, excess = excess, np.max(residuals / goals)
+        excess = float(np.max(residuals / goals))
+        history.append(excess)
         if final:
             worst = worst or 10.0 * excess
             report(1.0 - max(np.log(10.0 * excess), 0.1) / np.log(10.0 * worst) if 1.0 < excess < worst else 0.0)

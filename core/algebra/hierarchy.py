@@ -19,6 +19,7 @@ SMALL, LARGE = 300, 900  # unknowns that are solved whole in a hundredth of a se
 STRONG = (3e-3, 1e-2, 3e-2, 0.1)  # coupling over the diagonal from which unknowns may share an aggregate: about 20
 # by the first one, fewer by the others
 _WEAK = 1e-3  # coupling over the diagonal up to which the smoother leaves it out: two fifths of all, of little energy
+_USUAL = 64  # couplings of a row that these shares of the diagonal are for
 _ROUNDING = 1e-12  # of the largest diagonal entry: smaller ones are rounding error
 _SMOOTHED = 0.3  # relative to the largest eigenvalue: the smoother damps errors of eigenvalues above it
 
@@ -95,10 +96,12 @@ def build_levels(
         # with no other; the smoother takes these, too, but does not divide by less than `low`.
         smooth = np.where(diagonal > _ROUNDING * highest, np.maximum(diagonal, low * own), np.inf)
         diagonal[diagonal <= np.maximum(_ROUNDING * highest, low * own)] = np.inf
-        strong = _strong(rows, diagonal, slowest)
+        # Couplings are compared as they act on the slowest, whatever the units of the unknowns; of many each is small.
+        unit = slowest**2 * np.minimum(1.0, _USUAL / np.diff(matrix.indptr))
+        strong = _strong(rows, unit * smooth, slowest)
         few = Rows(strong, pool, report)
         for share in STRONG:
-            part = aggregates(few, diagonal, share, report)[0]
+            part = aggregates(few, unit * diagonal, share, report, slowest)[0]
             if part.max() >= enough:
                 break
         norm = np.sqrt(np.bincount(part, slowest**2))
@@ -143,17 +146,19 @@ def _locally_largest(matrix: Rows, diagonal: Floats) -> Floats:
     return np.concatenate(list(matrix.each(measure)))
 
 
-def _strong(matrix: Rows, diagonal: Floats, slowest: Floats) -> sparse.csr_array:
+def _strong(matrix: Rows, size: Floats, slowest: Floats) -> sparse.csr_array:
     """Return a symmetric matrix without weak couplings; its product with the slowest is the same.
 
-    What hardly couples smooths hardly: errors of high frequency are those of near neighbors.
+    Sizes, (n,), are those of the diagonal, to which couplings are compared, in units of the slowest. What hardly
+    couples smooths hardly: errors of high frequency are those of near neighbors.
     """
 
     def keep(rows: slice, part: sparse.csr_array) -> tuple[Array, Array, Array]:
         row = np.repeat(np.arange(rows.start, rows.stop, dtype=np.int32), np.diff(part.indptr))
         column, itself = part.indices, row == part.indices
-        kept = itself | (np.abs(part.data) > _WEAK * np.minimum(diagonal[row], diagonal[column]))
-        lost = np.add.reduceat(np.where(kept, 0.0, part.data * slowest[column]), part.indptr[:-1])
+        pull = part.data * slowest[column]
+        kept = itself | (np.abs(pull) * slowest[row] > _WEAK * np.minimum(size[row], size[column]))
+        lost = np.add.reduceat(np.where(kept, 0.0, pull), part.indptr[:-1])
         data = part.data.copy()
         data[itself] += lost / slowest[rows]
         return data[kept], column[kept], np.add.reduceat(kept, part.indptr[:-1], dtype=np.int32)
@@ -168,21 +173,26 @@ def _single(matrix: sparse.csr_array) -> sparse.csr_array:
     return sparse.csr_array((matrix.data.astype(np.float32), matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
-def aggregates(matrix: Rows, diagonal: Floats, share: float, report: Report) -> tuple[Ints, Ints]:
+def aggregates(
+    matrix: Rows, size: Floats, share: float, report: Report, slowest: Floats | float = 1.0
+) -> tuple[Ints, Ints]:
     """Aggregate the unknowns of a matrix around roots, no two of which couple strongly.
 
-    Every row of the matrix stores its diagonal, zero or not. Return the number of each unknown's part, (n,), and the
-    root of each part, (m,), which couples strongly with all of it.
+    Every row of the matrix stores its diagonal, zero or not. Couplings are compared to sizes, (n,), such as those of
+    the diagonal, in units of the slowest, (n,). Return the number of each unknown's part, (n,), and the root of each
+    part, (m,), which couples strongly with all of it.
     """
+    slowest = np.broadcast_to(slowest, len(size))
 
     def strong(rows: slice, part: sparse.csr_array) -> tuple[Array, Array, Array]:
         row = np.repeat(np.arange(rows.start, rows.stop, dtype=np.int32), np.diff(part.indptr))
         itself = row == part.indices
-        kept = itself | (-part.data > share * np.minimum(diagonal[row], diagonal[part.indices]))
-        return row[kept], part.indices[kept], np.where(itself[kept], np.inf, -part.data[kept])
+        pull = -part.data * slowest[row] * slowest[part.indices]
+        kept = itself | (pull > share * np.minimum(size[row], size[part.indices]))
+        return row[kept], part.indices[kept], np.where(itself[kept], np.inf, pull[kept])
 
     row, column, weight = on_all_cores(np.concatenate, list(zip(*matrix.each(strong), strict=True)))
-    n = len(diagonal)
+    n = len(size)
     first = np.searchsorted(row, np.arange(n, dtype=np.int32))
     rank, root = np.random.default_rng(0).permutation(n).astype(np.int32), np.zeros(n, dtype=bool)
     waiting, couples, start = np.arange(n), column, first

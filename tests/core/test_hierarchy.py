@@ -5,6 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 from scipy import sparse
+from scipy.linalg import eigh
 from scipy.sparse.linalg import eigsh, splu
 from scipy.spatial import cKDTree
 
@@ -228,6 +229,47 @@ def test_the_result_does_not_depend_on_cores(operators, coarse, monkeypatch):
     np.testing.assert_array_equal(found[0], found[1])
 
 
+def scattered(count, reach, spread, far=0):
+    """Random points with so many in a wide sparse part, as symmetric form of weights and of areas that vary."""
+    rng = np.random.default_rng(0)
+    points = np.concatenate([rng.random((count, 2)), [1.0, 0.0] + 3.0 * rng.random((far, 2))])
+    near = cKDTree(points).query(points, k=reach)[0][:, -1]
+    pairs = cKDTree(points).query_pairs(near.max(), output_type="ndarray")
+    length = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1) / near[pairs].max(axis=1)
+    pairs, length = pairs[length < 1.0], length[length < 1.0]
+    half = sparse.coo_array(((1.0 - length) ** 2, pairs.T), shape=(len(points),) * 2)
+    weights = (half + half.T).tocsr()
+    root = np.sqrt(near**2 * np.exp(spread * rng.standard_normal(len(points))))
+    scale = sparse.diags_array(1.0 / root)
+    matrix = (scale @ (sparse.diags_array(weights.sum(axis=1)) - weights) @ scale).tocsr()
+    return (0.5 / matrix.diagonal().max() * (matrix + matrix.T)).tocsr(), root
+
+
+SCATTERED = {
+    "even": (2500, 20, 0.1),
+    "areas that vary": (2500, 20, 3.0),
+    "crowded": (4000, 150, 1.5),
+    "a sparse part": (2500, 20, 0.1, 60),
+}
+
+
+@pytest.mark.parametrize("given", SCATTERED.values(), ids=SCATTERED)
+def test_a_cycle_overshoots_by_little(given):
+    """Wherever couplings are weak or many, and where the diagonal is no larger than eigenvalues that are wanted."""
+    matrix, root = scattered(*given)
+    wanted = eigsh(matrix, 40, sigma=-1e-3, return_eigenvectors=False).max()
+    with ThreadPoolExecutor(1) as pool:
+        levels, last, mass = hierarchy.build_levels(matrix, root, 300, 120, pool, silent, wanted)
+        values, vectors = eigh(last.toarray(), mass.toarray())
+        coarsest = davidson._known(values, vectors, mass @ vectors)
+        step, shift = np.random.default_rng(1).standard_normal((len(root), 1)), np.zeros(1, dtype=np.float32)
+        for _ in range(25):
+            step /= np.linalg.norm(step)
+            load = (matrix @ step).astype(np.float32)
+            step = hierarchy.solve_roughly(levels, coarsest, load, shift, 40).astype(np.float64)
+    assert np.linalg.norm(step) < davidson._CYCLED[1]
+
+
 def test_where_coarse_versions_do_not_help(coarse):
     """Nothing is coupled, or all of it repels: the plain steps go on."""
     for share in (0.0, 0.3):
@@ -298,7 +340,7 @@ def test_a_matrix_without_weak_couplings_is_about_the_same(operators, name):
     root = np.sqrt(laplacian.areas)
     matrix = (sparse.diags_array(1.0 / root) @ laplacian.stiffness @ sparse.diags_array(1.0 / root)).tocsr()
     with ThreadPoolExecutor(2) as pool:
-        strong = hierarchy._strong(Rows(matrix, pool, silent), matrix.diagonal(), root)
+        strong = hierarchy._strong(Rows(matrix, pool, silent), laplacian.stiffness.diagonal(), root)
     assert strong.nnz < 0.8 * matrix.nnz
     assert strong.indices.dtype == strong.indptr.dtype == matrix.indices.dtype
     assert abs(strong - strong.T).max() <= 1e-12 * abs(matrix).max()
