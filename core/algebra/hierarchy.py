@@ -92,8 +92,8 @@ def build_levels(
     while matrix.shape[0] > least:
         n, diagonal, rows = matrix.shape[0], matrix.diagonal(), Rows(matrix, pool, report)
         highest, own = diagonal.max(), 1.0 if mass is None else mass.diagonal()
-        # The diagonal of an unknown that is a whole component is rounding error. Like those below `low`, it couples
-        # with no other; the smoother takes these, too, but does not divide by less than `low`.
+        # The diagonal of an unknown that is a whole component is rounding error: it couples with no other. Those below
+        # `low` share no aggregate; the smoother takes them as they couple, but does not divide by less than `low`.
         smooth = np.where(diagonal > _ROUNDING * highest, np.maximum(diagonal, low * own), np.inf)
         diagonal[diagonal <= np.maximum(_ROUNDING * highest, low * own)] = np.inf
         # Couplings are compared as they act on the slowest, whatever the units of the unknowns; of many each is small.
