@@ -33,12 +33,12 @@ def follow(obj, name, part, columns, spacing):
     gradient. The spacing of the points is the length in which discs are kept.
     """
     kept, data = obj.meshfree, obj.data
-    forget(obj)
     if not _is_writable(data):  # as in Edit Mode: earlier gradients are valid for the same attribute
         kept.slopes_of = kept.slopes_of if columns and kept.slopes_of.startswith(f"{part} {name} ") else ""
         return
     points = own_positions(data)
     if not columns or not has_vectors(data, DISC) or not np.isfinite(points).all():
+        forget(obj)
         kept.slopes_of = ""
         if not any(other.meshfree.slopes_of for other in sharing_objects(obj)):
             remove_attributes(data, SLOPE, SLOPE_2, SLOPE_OF)
@@ -49,6 +49,7 @@ def follow(obj, name, part, columns, spacing):
     holders = [other for other in (obj, *sharing_objects(obj)) if other.meshfree.slopes_of == wanted]
     kept.slopes_of = wanted if holders and SLOPE in data.attributes else ""
     if kept.slopes_of:
+        forget(obj)
         return
 
     def compute(progress):
@@ -57,7 +58,7 @@ def follow(obj, name, part, columns, spacing):
 
     values = _as_number(read_attribute(data, name))
     kept.slopes_later = True
-    later(_KIND, obj, compute, partial(_take, seen, wanted, values))
+    later(_KIND, obj, wanted, compute, partial(_take, seen, values))
 
 
 def forget(obj):
@@ -67,7 +68,7 @@ def forget(obj):
         obj.meshfree.slopes_later = False
 
 
-def _take(seen, wanted, values, obj, job):
+def _take(seen, values, obj, wanted, job):
     """Write gradients of values, unless points or discs, of which a checksum is known, have changed since."""
     data = obj.data
     if not _is_writable(data):

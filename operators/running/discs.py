@@ -1,7 +1,5 @@
 """The discs of the display after points were moved, added or deleted."""
 
-from functools import partial
-
 import numpy as np
 
 from ... import core
@@ -56,10 +54,10 @@ def renew_discs(obj, points):
     if DISC not in data.attributes or obj.meshfree.discs_of in ("", points):  # empty where it is not known
         return
     local, sides = own_positions(data).astype(np.float64), read_attribute(data, DISC).astype(np.float64)
-    later("Discs", obj, lambda progress: _found(local, sides, progress), partial(_take, points))
+    later("Discs", obj, points, lambda progress: _found(local, sides, progress), _take)
 
 
-def _take(points, obj, job):
+def _take(obj, points, job):
     """Write the discs that were found, unless the points have changed since."""
     if obj.mode != "OBJECT" or points_checksum(obj.data) != points:
         return

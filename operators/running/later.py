@@ -15,8 +15,9 @@ _TICK = 0.1  # seconds between two looks at threads
 
 
 class _Work(NamedTuple):
-    """A job, and the function that takes its result."""
+    """What is wanted, the job that finds it, and the function that takes its result."""
 
+    wanted: str
     job: Job
     take: object
 
@@ -24,20 +25,24 @@ class _Work(NamedTuple):
         """Wait for the result and let it be taken, if the object is there."""
         self.job.wait(None)
         if obj is not None:
-            self.take(obj, self.job)
+            self.take(obj, self.wanted, self.job)
 
 
 _works = {}  # by what they are of, and the session_uid of their object
 
 
-def later(kind: str, obj, compute, take):
-    """Compute in a thread, and call `take` with the object and the job, whose result it asks for, when that is there.
+def later(kind: str, obj, wanted: str, compute, take):
+    """Compute in a thread; then call `take` with the object, what was wanted and the job, which it asks for the result.
 
     `compute` is called with a progress callback. Scripts, renders and few points wait for it. Earlier work of this kind
-    for the object is dropped; whether what was found is still wanted is for `take` to tell.
+    for the object goes on if the same is wanted, as while a setting is dragged, or is dropped; whether what was found
+    still fits the object is for `take` to tell.
     """
+    under_way = _works.get((kind, obj.session_uid))
+    if under_way is not None and under_way.wanted == wanted:
+        return
     drop(kind, obj)
-    work = _Work(Job(kind, [], compute), take)
+    work = _Work(wanted, Job(kind, [], compute), take)
     if bpy.app.background or bpy.app.is_job_running("RENDER") or point_count(obj.data) <= _AT_ONCE:
         work.end(obj)
         return

@@ -100,6 +100,16 @@ def test_colors_within_discs_of_many_points_come_later_and_are_saved(smoothing, 
     gui.wait_until("smooth('Y')")
 
 
+@pytest.mark.parametrize("smoothing", [30_000], indirect=True)
+def test_no_second_thread_looks_for_the_same_colors(smoothing):
+    """Such as while a setting is dragged that they do not depend on."""
+    gui = smoothing
+    gui.python("from bl_ext.user_default.meshfree_laplacian.operators.running.later import _works")
+    gui.python("shown.component = 'Y'; first = [*_works.values()]; shown.reverse = True; then = [*_works.values()]")
+    assert gui.python("len(first) == 1 and first[0] is then[0] and not first[0].job.reason")
+    gui.wait_until("smooth('Y')")
+
+
 @pytest.mark.parametrize("smoothing", [3000, 30_000], indirect=True)
 def test_colors_within_discs_are_there_again_after_undo(smoothing):
     gui = smoothing
