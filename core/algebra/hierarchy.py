@@ -20,7 +20,7 @@ STRONG = (3e-3, 1e-2, 3e-2, 0.1)  # coupling over the diagonal from which unknow
 # by the first one, fewer by the others
 _WEAK = 1e-3  # coupling over the diagonal up to which the smoother leaves it out: two fifths of all, of little energy
 _USUAL = 64  # couplings of a row that these shares of the diagonal are for
-_ROUNDING = 1e-12  # of the largest diagonal entry: smaller ones are rounding error
+ROUNDING = 1e-12  # of the largest diagonal entry: smaller ones are rounding error
 _SMOOTHED = 0.3  # relative to the largest eigenvalue: the smoother damps errors of eigenvalues above it
 
 
@@ -94,8 +94,8 @@ def build_levels(
         highest, own = diagonal.max(), 1.0 if mass is None else mass.diagonal()
         # The diagonal of an unknown that is a whole component is rounding error: it couples with no other. Those below
         # `low` share no aggregate; the smoother takes them as they couple, but does not divide by less than `low`.
-        smooth = np.where(diagonal > _ROUNDING * highest, np.maximum(diagonal, low * own), np.inf)
-        diagonal[diagonal <= np.maximum(_ROUNDING * highest, low * own)] = np.inf
+        smooth = np.where(diagonal > ROUNDING * highest, np.maximum(diagonal, low * own), np.inf)
+        diagonal[diagonal <= np.maximum(ROUNDING * highest, low * own)] = np.inf
         # Couplings are compared as they act on the slowest, whatever the units of the unknowns; of many each is small.
         unit = slowest**2 * np.minimum(1.0, _USUAL / np.diff(matrix.indptr))
         strong = _strong(rows, unit * smooth, slowest)

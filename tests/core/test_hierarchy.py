@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 from scipy.linalg import eigh
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import eigsh, splu
 from scipy.spatial import cKDTree
 
@@ -251,6 +252,20 @@ SCATTERED = {
     "crowded": (4000, 150, 1.5),
     "a sparse part": (2500, 20, 0.1, 60),
 }
+
+
+def test_constants_of_components_are_known(monkeypatch):
+    """To all digits, without any step, for which single precision is too coarse."""
+    matrix, root = scattered(2500, 20, 1.0)
+    assert connected_components(matrix)[0] == 1
+    fixed = matrix + 1e-3 * sparse.eye_array(len(root))  # a component that has no zero
+    several, roots = sparse.block_diag([matrix, fixed, matrix, matrix], format="csr"), np.tile(root, 4)
+    monkeypatch.setattr(davidson, "_STEPS", 0)
+    values, vectors = coarse_to_fine(several, roots, 3, 1e-7, 1e-6, lambda *_: None)
+    assert np.abs(values).max() < 1e-15
+    constant = (vectors / roots[:, None]).reshape(4, -1, 3)
+    np.testing.assert_allclose(constant, constant[:, :1] + np.zeros_like(constant), rtol=0.0, atol=1e-9)
+    assert np.abs(constant[1]).max() < 1e-9
 
 
 @pytest.mark.parametrize("given", SCATTERED.values(), ids=SCATTERED)
