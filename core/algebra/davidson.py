@@ -1,6 +1,7 @@
 """Few eigenpairs of many unknowns: on coarse versions of the matrix first, then by Davidson's method in a block."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -62,23 +63,25 @@ def coarse_to_fine(
     values, vectors : ndarray, (count,) and (n, count), or None
         Ascending, orthonormal.
     """
+    rounding = np.finfo(np.float32).eps * matrix.diagonal().max()  # below which no residual falls in single precision
+    precision = np.dtype(np.float64 if rounding > 0.5 * _GUARDED * scale > 0.0 else np.float32)
     with workers() as pool:
         least = max(SMALL, min(20 * count, LARGE), 5 * count)
-        levels, last, mass = build_levels(matrix, slowest, least, 3 * count, pool, report, scale)
+        levels, last, mass = build_levels(matrix, slowest, least, 3 * count, pool, report, scale, precision)
         if not levels or last.shape[0] > max(least, _DENSE):
             return None
         values, vectors = eigh(last.toarray(), mass.toarray())
-        coarsest = _known(values, vectors, mass @ vectors)
+        coarsest = _known(values, vectors, mass @ vectors, precision)
         flat = np.searchsorted(values, 1e-9 * values[-1])  # dimension of the null space: one for each component
         for number in reversed(range(len(levels))):
             level, finest = levels[number], number == 0
             beyond = np.searchsorted(values, (1.0 + _BEYOND) * values[min(count, len(values)) - 1])
             size = min(max(min(max(beyond, count), 2 * count + _WIDE), flat) + _GUARDS, len(values))
-            vectors = level.extension @ vectors[:, : size if finest else 2 * size].astype(np.float32)
-            vectors = smoothed(level, np.zeros((len(vectors), 1), dtype=np.float32), vectors, level.steps)
-            guards = _random(len(vectors), max(_RANDOM, count + _RANDOM - vectors.shape[1])).astype(np.float32)
+            vectors = level.extension @ vectors[:, : size if finest else 2 * size].astype(precision)
+            vectors = smoothed(level, np.zeros((len(vectors), 1), dtype=precision), vectors, level.steps)
+            guards = _random(len(vectors), max(_RANDOM, count + _RANDOM - vectors.shape[1])).astype(precision)
             for _ in range(_FILTERED):
-                guards = solve_roughly(levels[number:], coarsest, guards, np.zeros(guards.shape[1], np.float32), size)
+                guards = solve_roughly(levels[number:], coarsest, guards, np.zeros(guards.shape[1], precision), size)
                 _normalize(guards)
             exact = _null_vectors(matrix, slowest)[:, :flat] if finest else vectors[:, :0]
             vectors = _beside(exact, vectors[:, exact.shape[1] :], guards)
@@ -87,12 +90,12 @@ def coarse_to_fine(
                 levels[number:], coarsest, vectors, size, wanted, goal, scale, limit, report, finest
             )
             if not finest:
-                level.known = _known(values, vectors, level.weighed(vectors))
+                level.known = _known(values, vectors, level.weighed(vectors), precision)
     return (values[:count], vectors[:, :count]) if right else None
 
 
-def _known(values: Floats, vectors: Floats, duals: Floats) -> Known:
-    return Known(values, vectors.astype(np.float32), duals.astype(np.float32))
+def _known(values: Floats, vectors: Floats, duals: Floats, precision: Any) -> Known:
+    return Known(values, vectors.astype(precision), duals.astype(precision))
 
 
 def refine(
@@ -153,7 +156,7 @@ def refine(
                 _turn(vectors, basis)
                 _turn(image, basis)
                 dual = level.weighed(vectors)
-                residual, norms = _residual(image, dual, values)
+                residual, norms = _residual(image, dual, values, level.precision)
                 del image
             report()
             measure = max(values[wanted - 1], scale)
@@ -171,28 +174,41 @@ def refine(
             report(1.0 - max(np.log(10.0 * excess), 0.1) / np.log(10.0 * worst) if 1.0 < excess < worst else 0.0)
         if right or step == limit:
             break
-        # The rest is in single precision: corrections of a few digits suffice.
+        # The rest is in the precision of V-cycles: corrections of a few digits suffice.
         cycles = max(np.ceil(np.log(excess) / np.log(_FALL)), 1.0)  # spread evenly over the fewest steps
         cycles = int(np.ceil(cycles / np.ceil(cycles / _CYCLES)))
-        change = _corrections(levels, coarsest, vectors, dual, residual, values, active, size, cycles)
+        change, lengths = _corrections(levels, coarsest, vectors, dual, residual, values, active, size, cycles)
+        coupling = product(residual.T, change)
         report()
+        # Some eigenvalue is as near to each value as the residual in the norm of the inverse, times its square root.
+        # What is of high frequency counts for little in that: it is enough for the last of a block, which fall slowly.
+        energy = values[wanted - 1] * norms[active] * lengths * np.abs(coupling[active, np.arange(len(active))])
+        others = active >= wanted
+        if np.all(residuals[:wanted] + drift <= tolerance) and np.all(
+            np.sqrt(energy[others]) <= goals[active[others]] * measure
+        ):
+            right = True
+            break
         # Rayleigh-Ritz on the vectors and an orthonormal basis of their corrections.
         weighed = level.weighed(change)
         lengths, basis = eigh(product(change.T, weighed).astype(np.float64))
         kept = lengths > 1e-5 * lengths[-1]  # the others are rounding error
         basis = basis[:, kept] / np.sqrt(lengths[kept])
-        coupling = product(residual.T, change) @ basis
-        report()
+        coupling = coupling @ basis
         changed = level.matrix @ change
         own = basis.T @ product(change.T, changed) @ basis
         ritz, parts = eigh(np.block([[np.diag(values), coupling], [coupling.T, own]]))
-        ritz, parts, share = ritz[:count], parts[:count, :count], (basis @ parts[count:, :count]).astype(np.float32)
+        ritz, parts, share = (
+            ritz[:count],
+            parts[:count, :count],
+            (basis @ parts[count:, :count]).astype(level.precision),
+        )
         report()
         norms = _renew(vectors, dual, residual, (values, ritz), parts, (change, weighed, changed), share)
         values = ritz
         del change, weighed, changed
         lost = np.linalg.norm(share[:, :wanted], axis=0).max()
-        drift += np.finfo(np.float32).eps * level.top * lost / measure
+        drift += np.finfo(level.precision).eps * level.top * lost / measure
     return values, vectors, right
 
 
@@ -220,17 +236,18 @@ def _corrections(
     active: Ints,
     size: int,
     cycles: int,
-) -> Array:
+) -> tuple[Array, Floats]:
     """Return corrections of the active vectors by V-cycles, accelerated, of length one and orthogonal to all vectors.
 
+    Return as well by what they were divided: those of residuals of length one.
     They are computed for some of them at a time, as a V-cycle takes several times their memory.
     """
-    level, result = levels[0], np.empty((len(vectors), len(active)), dtype=np.float32)
+    level, result = levels[0], np.empty((len(vectors), len(active)), dtype=residual.dtype)
     turns = -(-len(active) // max(_COLUMNS, _ENTRIES // len(vectors)))
     for part in shares(len(active), turns):
-        load, shifts = _columns(residual, active[part]), values[active[part]].astype(np.float32)
+        load, shifts = _columns(residual, active[part]), values[active[part]].astype(residual.dtype)
         _normalize(load)
-        relative = shifts / np.float32(values[size - 1])
+        relative = shifts / residual.dtype.type(values[size - 1])
         rates, change = chebyshev_steps(*_CYCLED), None
         for left in reversed(range(cycles)):
             cycle = solve_roughly(levels, coarsest, load, relative, size)
@@ -238,8 +255,7 @@ def _corrections(
             change = _advance(change, cycle, *next(rates), result[:, part])
             if left:
                 load = _rest(level, load, change, shifts)
-    _normalize(result)
-    return result
+    return result, _normalize(result)
 
 
 def _advance(change: Array | None, cycle: Array, kept: float, rate: float, result: Array) -> Array:
@@ -295,9 +311,9 @@ def _turn(vectors: Floats, basis: Floats) -> None:
     on_all_cores(turn, blocks(len(vectors), _BLOCK))
 
 
-def _residual(image: Floats, dual: Floats, values: Floats) -> tuple[Array, Floats]:
-    """Return ``image - dual * values`` in single precision, and the lengths of its columns, never zero."""
-    result = np.empty(image.shape, dtype=np.float32)
+def _residual(image: Floats, dual: Floats, values: Floats, precision: Any) -> tuple[Array, Floats]:
+    """Return ``image - dual * values`` in some precision, and the lengths of its columns, never zero."""
+    result = np.empty(image.shape, dtype=precision)
 
     def subtract(rows: slice) -> Floats:
         missed = image[rows] - dual[rows] * values
@@ -337,7 +353,7 @@ def _renew(
 
 
 def _rest(level: Level, load: Array, change: Array, shifts: Array) -> Array:
-    """Return ``load - (matrix - shifts * mass) change`` in single precision, in the memory of the load."""
+    """Return ``load - (matrix - shifts * mass) change`` in its precision, in the memory of the load."""
     weighed = level.weighed(change)
 
     def subtract(rows: slice, values: Array) -> None:
@@ -347,11 +363,12 @@ def _rest(level: Level, load: Array, change: Array, shifts: Array) -> Array:
     return level.matrix.product(change, subtract, load)
 
 
-def _normalize(vectors: Array) -> None:
-    """Divide columns by their lengths, in place; one of zeros stays so."""
+def _normalize(vectors: Array) -> Floats:
+    """Divide columns by their lengths, in place, and return these; one of zeros stays so."""
     parts = _few_parts(vectors)
     lengths = _roots(on_all_cores(lambda rows: np.einsum("ij,ij->j", vectors[rows], vectors[rows]), parts))
     on_all_cores(lambda rows: np.divide(vectors[rows], lengths, out=vectors[rows]), parts)
+    return lengths
 
 
 def _few_parts(vectors: Array) -> list[slice]:

@@ -29,7 +29,7 @@ class Known:
     """The lowest eigenpairs of one version of the matrix."""
 
     values: Floats  # (q,)
-    # (n, q) float32, the eigenvectors, and their products with the mass
+    # (n, q), the eigenvectors, and their products with the mass
     vectors: Array
     duals: Array
 
@@ -39,14 +39,21 @@ class Level:
     """One version of the matrix."""
 
     matrix: Rows  # (n, n)
-    strong: Rows  # (n, n), the same without weak couplings, in single precision, for the smoother
+    strong: Rows  # (n, n), the same without weak couplings, in the precision of V-cycles, for the smoother
     mass: Rows | None  # (n, n), inner product of its functions; none stands for the identity
     top: float  # largest eigenvalue, about
-    steps: list[Array]  # (n, 1) float32 each, step lengths of the Chebyshev smoother, divided by the diagonal
-    # (n, m) and (m, n), interpolation from the next level to this one, in single precision, and its transpose
+    steps: list[
+        Array
+    ]  # (n, 1) each, in that precision: step lengths of the Chebyshev smoother, divided by the diagonal
+    # (n, m) and (m, n), interpolation from the next level to this one, in that precision, and its transpose
     extension: Rows
     restriction: Rows
     known: Known | None = None
+
+    @property
+    def precision(self) -> Any:
+        """Of V-cycles."""
+        return self.steps[0].dtype
 
     def weighed(self, vectors: Array) -> Any:
         """Return the product of vectors, (n, k), with the mass."""
@@ -61,6 +68,7 @@ def build_levels(
     pool: ThreadPoolExecutor,
     report: Report,
     low: float = 0.0,
+    precision: Any = np.float32,
 ) -> tuple[list[Level], sparse.csr_array, sparse.csr_array]:
     """Build ever smaller versions of a matrix by smoothed aggregation (Vanek, Mandel and Brezina 1996).
 
@@ -79,6 +87,8 @@ def build_levels(
     low : float
         Eigenvalue up to which the last version has to represent all eigenvectors. An unknown whose Rayleigh quotient is
         no larger, such as a part weakly connected to the rest, is one of them: it is not aggregated with others.
+    precision : dtype
+        Of V-cycles.
 
     Returns
     -------
@@ -116,12 +126,12 @@ def build_levels(
         levels.append(
             Level(
                 matrix=rows,
-                strong=Rows(_single(strong), pool, report),
+                strong=Rows(_rounded(strong, precision), pool, report),
                 mass=None if mass is None else Rows(mass, pool, report),
                 top=top * highest,
-                steps=[step[:, None].astype(np.float32) for step in smoothing_steps(top, smooth)],
-                extension=Rows(_single(prolongation), pool, report),
-                restriction=Rows(_single(restriction), pool, report),
+                steps=[step[:, None].astype(precision) for step in smoothing_steps(top, smooth)],
+                extension=Rows(_rounded(prolongation, precision), pool, report),
+                restriction=Rows(_rounded(restriction, precision), pool, report),
             )
         )
         matrix = back @ (rows @ prolongation)
@@ -168,9 +178,9 @@ def _strong(matrix: Rows, size: Floats, slowest: Floats) -> sparse.csr_array:
     return sparse.csr_array((data, column, start), shape=(len(slowest),) * 2)
 
 
-def _single(matrix: sparse.csr_array) -> sparse.csr_array:
-    """Return a matrix in single precision that shares the index arrays: neither may be sorted in place."""
-    return sparse.csr_array((matrix.data.astype(np.float32), matrix.indices, matrix.indptr), shape=matrix.shape)
+def _rounded(matrix: sparse.csr_array, precision: Any) -> sparse.csr_array:
+    """Return a matrix in some precision that shares the index arrays: neither may be sorted in place."""
+    return sparse.csr_array((matrix.data.astype(precision), matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
 def aggregates(
@@ -218,7 +228,7 @@ def smoothing_steps(top: float, diagonal: Floats) -> list[Floats]:
 
 
 def solve_roughly(levels: list[Level], last: Known, load: Array, shifts: Array, wanted: int) -> Array:
-    """Apply an approximate inverse of ``matrix - shift * mass`` by one V-cycle in single precision.
+    """Apply an approximate inverse of ``matrix - shift * mass`` by one V-cycle.
 
     Parameters
     ----------
@@ -226,15 +236,16 @@ def solve_roughly(levels: list[Level], last: Known, load: Array, shifts: Array, 
         From the one that the load is on; none at the last one.
     last : Known
         All eigenpairs of the last version.
-    load : ndarray, (n, k) float32
-    shifts : ndarray, (k,) float32
+    load : ndarray, (n, k)
+        In the precision of the levels.
+    shifts : ndarray, (k,)
         One for each column. It counts for known eigenvectors only: it is small against the eigenvalues of all others.
     wanted : int
         Lowest eigenvectors for which the shift, which may lie among their eigenvalues, is left out.
 
     Returns
     -------
-    ndarray, (n, k) float32
+    ndarray, (n, k)
     """
     known, solved = levels[0].known if levels else last, None
     if known is not None:
@@ -243,7 +254,7 @@ def solve_roughly(levels: list[Level], last: Known, load: Array, shifts: Array, 
         shift = shifts * values[wanted - 1]
         distance = np.where(np.arange(len(values))[:, None] < wanted, np.maximum(values, floor), values - shift)
         share = product(known.vectors.T, load)
-        solved = product(known.vectors, (share / np.maximum(distance, 0.1 * floor)).astype(np.float32))
+        solved = product(known.vectors, (share / np.maximum(distance, 0.1 * floor)).astype(load.dtype))
         if not levels:
             return solved
         load = load - product(known.duals, share)

@@ -268,6 +268,16 @@ def test_constants_of_components_are_known(monkeypatch):
     assert np.abs(constant[1]).max() < 1e-9
 
 
+@pytest.mark.parametrize("spread", [1.0, 2.0, 3.0])
+def test_modes_where_areas_vary_by_powers_of_ten(spread):
+    """In double precision where residuals of single precision would not fall to those of the last of the block."""
+    matrix, root = scattered(2500, 20, spread)
+    exact = np.sort(eigsh(matrix, 20, sigma=-1e-12, return_eigenvectors=False))
+    values, vectors = coarse_to_fine(matrix, root, 20, 2e-7, exact[-1], lambda *_: None)
+    np.testing.assert_allclose(values[1:], exact[1:], rtol=1e-6)
+    assert np.linalg.norm(matrix @ vectors - vectors * values, axis=0).max() <= 2.2e-7 * values[-1]
+
+
 @pytest.mark.parametrize("given", SCATTERED.values(), ids=SCATTERED)
 def test_a_cycle_overshoots_by_little(given):
     """Wherever couplings are weak or many, and where the diagonal is no larger than eigenvalues that are wanted."""
@@ -276,7 +286,7 @@ def test_a_cycle_overshoots_by_little(given):
     with ThreadPoolExecutor(1) as pool:
         levels, last, mass = hierarchy.build_levels(matrix, root, 300, 120, pool, silent, wanted)
         values, vectors = eigh(last.toarray(), mass.toarray())
-        coarsest = davidson._known(values, vectors, mass @ vectors)
+        coarsest = davidson._known(values, vectors, mass @ vectors, np.float32)
         step, shift = np.random.default_rng(1).standard_normal((len(root), 1)), np.zeros(1, dtype=np.float32)
         for _ in range(25):
             step /= np.linalg.norm(step)
