@@ -18,7 +18,7 @@ from ..types import Floats, Ints, Progress, Report
 
 TOLERANCE = 2e-7  # eigenvalues are then right to ten digits and more: their errors are quadratic in the residual
 
-_FEW = 0.01  # modes over points up to which multigrid is faster than Lanczos: of 6,000 to 50,000 random points
+_FEW = 0.02  # modes over points up to which multigrid is faster than Lanczos: of scans and of random points
 _ALIKE = 1e-4  # relative difference up to which entries count as of one size, as on a symmetric shape
 _BLOCK = 1 << 13  # rows of vectors at one time
 _FLAT = 4.0  # k h beyond which the symbol is nearly constant
