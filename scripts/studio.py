@@ -250,18 +250,20 @@ def add_display(obj, radius):
 
 
 def paint(name, color, normals=""):
-    """Return a matt material of one colour."""
+    """Return a matt material of one colour, lit by an attribute of normals, if given, on the side that is seen."""
     material = bpy.data.materials.new(name)
     tree = part("ui.materials").new_tree(material)
     normal = None
     if normals:
-        normal = tree.node(
+        turned = tree.node(
             "ShaderNodeVectorTransform",
             tree.node("ShaderNodeAttribute", attribute_name=normals).outputs["Vector"],
             vector_type="NORMAL",
             convert_from="OBJECT",
             convert_to="WORLD",
         )
+        away = tree.vector("SCALE", tree.node("ShaderNodeNewGeometry").outputs["Incoming"], -1.0)
+        normal = tree.vector("FACEFORWARD", turned, away, turned)
     tree.output("ShaderNodeOutputMaterial", tree.node("ShaderNodeBsdfDiffuse", color, Normal=normal))
     return material
 
