@@ -138,7 +138,7 @@ def refine(
     values, vectors : ndarray, (m,) and (n, m)
         The best after these steps.
     right : bool
-        All residuals reached their goals.
+        All residuals reached their goals, those beyond the wanted ones in their own norm or in that of the inverse.
     """
     level, count, worst = levels[0], vectors.shape[1], 0.0
     history: list[float] = []  # of the residual over its goal, at the worst
@@ -184,10 +184,9 @@ def refine(
         # What is of high frequency counts for little in that: it is enough for the last of a block, which fall slowly.
         energy = values[wanted - 1] * norms[active] * lengths * np.abs(coupling[active, np.arange(len(active))])
         others = active >= wanted
-        if np.all(residuals[:wanted] + drift <= tolerance) and np.all(
-            np.sqrt(energy[others]) <= goals[active[others]] * measure
-        ):
-            right = True
+        right = bool(np.all(np.sqrt(energy[others]) <= goals[active[others]] * measure))
+        right &= bool(np.all(residuals[:wanted] + drift <= tolerance))
+        if right:
             break
         # Rayleigh-Ritz on the vectors and an orthonormal basis of their corrections.
         weighed = level.weighed(change)
@@ -198,11 +197,8 @@ def refine(
         changed = level.matrix @ change
         own = basis.T @ product(change.T, changed) @ basis
         ritz, parts = eigh(np.block([[np.diag(values), coupling], [coupling.T, own]]))
-        ritz, parts, share = (
-            ritz[:count],
-            parts[:count, :count],
-            (basis @ parts[count:, :count]).astype(level.precision),
-        )
+        ritz, parts, share = ritz[:count], parts[:count, :count], basis @ parts[count:, :count]
+        share = share.astype(level.precision)
         report()
         norms = _renew(vectors, dual, residual, (values, ritz), parts, (change, weighed, changed), share)
         values = ritz
