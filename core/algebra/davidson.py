@@ -54,7 +54,8 @@ def coarse_to_fine(
     tolerance : float
         Largest residual, over the last eigenvalue wanted.
     scale : float
-        Estimate of that eigenvalue, by which residuals are divided where it is larger.
+        Estimate of that eigenvalue, by which residuals are divided where it is larger, and by which the precision of
+        V-cycles is chosen; 0 where there is none, and the precision single.
     report : callable
         Called with the fraction done; may raise `Cancelled`.
 
@@ -63,7 +64,8 @@ def coarse_to_fine(
     values, vectors : ndarray, (count,) and (n, count), or None
         Ascending, orthonormal.
     """
-    rounding = np.finfo(np.float32).eps * matrix.diagonal().max()  # below which no residual falls in single precision
+    highest = matrix.diagonal().max()
+    rounding = np.finfo(np.float32).eps * highest  # below which no residual falls in single precision
     precision = np.dtype(np.float64 if rounding > 0.5 * _GUARDED * scale > 0.0 else np.float32)
     with workers() as pool:
         least = max(SMALL, min(20 * count, LARGE), 5 * count)
@@ -83,7 +85,7 @@ def coarse_to_fine(
             for _ in range(_FILTERED):
                 guards = solve_roughly(levels[number:], coarsest, guards, np.zeros(guards.shape[1], precision), size)
                 _normalize(guards)
-            exact = _null_vectors(matrix, slowest)[:, :flat] if finest else vectors[:, :0]
+            exact = _null_vectors(matrix, slowest, ROUNDING * highest)[:, :flat] if finest else vectors[:, :0]
             vectors = _beside(exact, vectors[:, exact.shape[1] :], guards)
             wanted, goal, limit = (count, tolerance, _STEPS) if finest else (size, _COARSE, _COARSE_STEPS)
             values, vectors, right = refine(
@@ -151,13 +153,7 @@ def refine(
             drift, count = np.inf, vectors.shape[1]
         while True:
             if drift == np.inf:
-                drift, image = 0.0, level.matrix @ vectors
-                values, basis = eigh(product(vectors.T, image), product(vectors.T, level.weighed(vectors)))
-                _turn(vectors, basis)
-                _turn(image, basis)
-                dual = level.weighed(vectors)
-                residual, norms = _residual(image, dual, values, level.precision)
-                del image
+                drift, (values, dual, residual, norms) = 0.0, _exactly(level, vectors)
             report()
             measure = max(values[wanted - 1], scale)
             residuals = norms / measure
@@ -167,7 +163,7 @@ def refine(
             right = excess + drift / tolerance <= 1.0
             if drift == 0.0 or right or (excess > 1.0 and drift <= 0.1 * residuals[active].min()):
                 break
-            drift = np.inf
+            drift = np.inf  # it may be no smaller than what is left: again with an exact product
         history.append(excess)
         if final:
             worst = worst or 10.0 * excess
@@ -206,6 +202,19 @@ def refine(
         lost = np.linalg.norm(share[:, :wanted], axis=0).max()
         drift += np.finfo(level.precision).eps * level.top * lost / measure
     return values, vectors, right
+
+
+def _exactly(level: Level, vectors: Floats) -> tuple[Floats, Any, Array, Floats]:
+    """Turn vectors to the best of their span, in place, by products in double precision.
+
+    Return their values, their products with the mass, and their residuals, in the precision of V-cycles, with lengths.
+    """
+    image = level.matrix @ vectors
+    values, basis = eigh(product(vectors.T, image), product(vectors.T, level.weighed(vectors)))
+    _turn(vectors, basis)
+    _turn(image, basis)
+    dual = level.weighed(vectors)
+    return values, dual, *_residual(image, dual, values, level.precision)
 
 
 def _goals(values: Floats, wanted: int, tolerance: float) -> Floats:
@@ -282,15 +291,16 @@ def _beside(*vectors: Array) -> Floats:
     )
 
 
-def _null_vectors(matrix: sparse.csr_array, slowest: Floats) -> Floats:
-    """Return the slowest vector on each component where it is in the null space, of length one, (n, k).
+def _null_vectors(matrix: sparse.csr_array, slowest: Floats, rounding: float) -> Floats:
+    """Return the slowest vector on each component where the matrix takes it to no more than rounding, (n, k).
 
+    They have length one.
     Of some components the coarse versions, in single precision, give them with errors that take steps to remove.
     """
     part = connected_components(matrix, connection="strong")[1]  # which takes a third of the time of weak ones
     length = np.sqrt(np.bincount(part, slowest**2))
     missed = np.sqrt(np.bincount(part, (matrix @ slowest) ** 2))
-    null = missed <= ROUNDING * matrix.diagonal().max() * length
+    null = missed <= rounding * length
     column = np.cumsum(null) - 1
     rows = np.flatnonzero(null[part])
     result = np.zeros((len(part), np.count_nonzero(null)))
