@@ -313,7 +313,8 @@ def _on_frame_change(scene, depsgraph):
 @persistent
 def _on_undo(scene, *_):
     forget_bound()
-    update_all(scene, bpy.context.evaluated_depsgraph_get(), _soon())
+    if _editable(scene):  # else leave evaluating to Blender, after its step
+        update_all(scene, bpy.context.evaluated_depsgraph_get(), _soon())
 
 
 @persistent

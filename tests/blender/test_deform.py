@@ -919,6 +919,25 @@ class TestUndo:
         assert_allclose(shown_points(strip), seen, atol=1e-5)
         assert displacement(strip).max() > 0.5
 
+    @pytest.mark.parametrize("bound", [False, True])
+    def test_handlers_evaluate_the_scene_only_for_bound_objects(self, strip, bound):
+        if bound:
+            bind()
+        bpy.ops.ed.undo_push(message="Ready")
+        strip.location.x = 1.0
+        bpy.context.view_layer.update()
+        bpy.ops.ed.undo_push(message="Moved")
+        evaluated, then = [], []
+        handlers = bpy.app.handlers.depsgraph_update_post, bpy.app.handlers.undo_post
+        handlers[0].append(bpy.app.handlers.persistent(lambda scene, depsgraph: evaluated.append(scene)))
+        handlers[1].append(bpy.app.handlers.persistent(lambda *_: then.append(len(evaluated))))
+        try:
+            bpy.ops.ed.undo()
+        finally:
+            for functions in handlers:
+                functions.pop()
+        assert then == [int(bound)]
+
 
 class TestFinding:
     """Bound objects are found among all others without a look at these."""
