@@ -16,6 +16,7 @@ from .options import LaplacianOptions
 _PER_NEIGHBOR = 42
 _ALONE = 43  # neighbors that would take as much as what each point needs for itself
 _PER_MODE = 70  # bytes a point for each mode beyond that: 50 and 400 modes took 3.4 and 28 kB a point
+_PER_DOUBLE = 160  # where multigrid needs double precision: 50 and 100 modes of scans by lidars took 152 and 153 bytes
 ADAPTIVE = 60.0  # neighbors in "adaptive" kernels on random points, which have the most
 _SHARE = 0.8  # of the free memory, to leave some for other programs
 # Files of a control group, of versions 2 and 1: the limit, what is taken, and which of that are cached files.
@@ -102,14 +103,18 @@ def check_room(count: int, each: int, advice: str = "Use fewer points, or free m
         )
 
 
-def check_mode_memory(count: int, modes: int) -> None:
-    """Refuse to compute modes that do not fit the free memory, by `NotEnoughMemoryError`, which says how many do."""
+def check_mode_memory(count: int, modes: int, double: bool = False) -> None:
+    """Refuse to compute modes that do not fit the free memory, by `NotEnoughMemoryError`, which says how many do.
+
+    With `double` those that multigrid finds in double precision.
+    """
     free = available_memory()
     if free is None:
         return
-    most = _fitting(free, _PER_MODE * count)
+    each = count * (_PER_DOUBLE if double else _PER_MODE)
+    most = _fitting(free, each)
     if modes > most:
-        needed = _PER_MODE * count * modes
+        needed = each * modes
         raise NotEnoughMemoryError(
             f"{modes} modes of {count:,} points would take about {needed / 2**30:.1f} GB of memory, and"
             f" {free / 2**30:.1f} GB are free: enough for {most} modes. Ask for fewer,"

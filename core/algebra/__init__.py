@@ -11,7 +11,7 @@ from .chebyshev import (
     degree_needed,
 )
 from .cholesky import factorize
-from .davidson import coarse_to_fine
+from .davidson import coarse_to_fine, needs_double
 from .dense import eliminate, inverses, lifted_inverse
 from .eigenvalue import largest_eigenvalue
 from .factors import dissect, sparsify

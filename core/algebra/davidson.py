@@ -65,8 +65,7 @@ def coarse_to_fine(
         Ascending, orthonormal.
     """
     highest = matrix.diagonal().max()
-    rounding = np.finfo(np.float32).eps * highest  # below which no residual falls in single precision
-    precision = np.dtype(np.float64 if rounding > 0.5 * _GUARDED * scale > 0.0 else np.float32)
+    precision = np.dtype(np.float64 if needs_double(highest, scale) else np.float32)
     with workers() as pool:
         least = max(SMALL, min(20 * count, LARGE), 5 * count)
         levels, last, mass = build_levels(matrix, slowest, least, 3 * count, pool, report, scale, precision)
@@ -94,6 +93,12 @@ def coarse_to_fine(
             if not finest:
                 level.known = _known(values, vectors, level.weighed(vectors), precision)
     return (values[:count], vectors[:, :count]) if right else None
+
+
+def needs_double(highest: float, scale: float) -> bool:
+    """Tell whether single precision is too low for V-cycles, by the largest diagonal entry; see `coarse_to_fine`."""
+    rounding = np.finfo(np.float32).eps * highest  # below which no residual falls in it
+    return bool(rounding > 0.5 * _GUARDED * scale > 0.0)
 
 
 def _known(values: Floats, vectors: Floats, duals: Floats, precision: Any) -> Known:

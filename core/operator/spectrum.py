@@ -7,7 +7,7 @@ from scipy import sparse
 from scipy.sparse.linalg import ArpackNoConvergence
 from scipy.spatial import cKDTree
 
-from ..algebra import Rows, blocks, coarse_to_fine, lift_lowest, matrix_by_rows, on_all_cores, workers
+from ..algebra import Rows, blocks, coarse_to_fine, lift_lowest, matrix_by_rows, needs_double, on_all_cores, workers
 from ..arguments import whole
 from ..errors import SolverError, TooFewPointsError, UnresolvedModesError
 from ..frozen import Frozen
@@ -86,10 +86,12 @@ def solve_spectrum(
     report()
     order, root, matrix = symmetric_form(stiffness, points, areas, component, report)
     # Scaled by a power of two to eigenvalues near one: solvers take those below an absolute threshold for zero.
-    unit = np.ldexp(1.0, np.frexp(matrix.diagonal().max())[1])
+    highest = matrix.diagonal().max()
+    unit = np.ldexp(1.0, np.frexp(highest)[1])
     matrix.data /= unit
     weyl = 4.0 * np.pi * count / areas.sum() / unit
     few = count <= _FEW * len(order)
+    check_mode_memory(n, count, few and needs_double(highest / unit, weyl))
     pairs = coarse_to_fine(matrix, 1.0 / root, count, tolerance, weyl, report) if few else None
     try:
         values, vectors = pairs or lift_lowest(matrix, count, _cut(areas, lengths, count) / unit, report)

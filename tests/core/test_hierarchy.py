@@ -273,6 +273,7 @@ def test_modes_where_areas_vary_by_powers_of_ten(spread):
     """In double precision where residuals of single precision would not fall to those of the last of the block."""
     matrix, root = scattered(2500, 20, spread)
     exact = np.sort(eigsh(matrix, 20, sigma=-1e-12, return_eigenvectors=False))
+    assert davidson.needs_double(matrix.diagonal().max(), exact[-1]) == (spread > 1.0)
     values, vectors = coarse_to_fine(matrix, root, 20, 2e-7, exact[-1], lambda *_: None)
     np.testing.assert_allclose(values[1:], exact[1:], rtol=1e-6)
     assert np.linalg.norm(matrix @ vectors - vectors * values, axis=0).max() <= 2.2e-7 * values[-1]

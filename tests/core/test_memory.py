@@ -1,5 +1,6 @@
 """What does not fit the free memory is refused before the start, with the number that fits."""
 
+import numpy as np
 import pytest
 
 import core
@@ -48,6 +49,20 @@ def test_modes_are_refused_before_the_start(free):
         laplacian.eigenpairs(100)
     assert caught.value.fitting == 11
     assert len(laplacian.eigenpairs(4).eigenvalues) == 4
+
+
+@pytest.mark.parametrize(("octaves", "refused"), [(5.0, False), (12.0, True)])
+def test_modes_in_double_precision_are_refused_before_they_take_twice_as_much(free, octaves, refused):
+    count = 2000
+    turns, reach = (3.0 - np.sqrt(5.0)) * np.pi * np.arange(count), np.exp2(octaves * np.arange(count) / count)
+    laplacian = core.build_laplacian(np.column_stack([reach * np.cos(turns), reach * np.sin(turns), 0.0 * turns]))
+    free(2_500_000)
+    if refused:
+        with pytest.raises(core.NotEnoughMemoryError, match="10 modes of 2,000 points .* enough for 6 modes"):
+            laplacian.eigenpairs(10)
+        free(5_000_000)
+    disc = 1.84118**2 / reach[-1] ** 2  # without what is left open in the middle
+    assert laplacian.eigenpairs(10).eigenvalues[1] == pytest.approx(disc, rel=0.1)
 
 
 def test_without_knowledge_nothing_is_refused(free):
