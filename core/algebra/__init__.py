@@ -17,6 +17,6 @@ from .eigenvalue import largest_eigenvalue
 from .factors import dissect, sparsify
 from .lanczos import lift_lowest
 from .rotations import TRACE, nearest_rotations, rotations_in_groups
-from .rows import Rows, matrix_by_rows
+from .rows import Rows, matrix_by_rows, multiply_rows
 from .solvers import Iterate, bounded_quadratic, conjugate_gradients, multigrid, solve_columns, solve_symmetric
 from .two_grid import TwoGrid

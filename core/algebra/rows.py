@@ -10,7 +10,7 @@ from scipy import sparse
 
 from ..cores import cores
 from ..types import Array, Ints, Report
-from .blocks import blocks, on_all_cores
+from .blocks import blocks, on_all_cores, workers
 
 PART = 1 << 20  # entries of a matrix that are multiplied at once, at most: some hundredths of a second
 _LEAST = 1 << 17  # and at least, unless these are all: fewer are multiplied before another thread has started
@@ -73,6 +73,15 @@ class Rows:
         for result in self._map(function, self._slices, self._parts):
             self._report()
             yield result
+
+
+def multiply_rows(matrix: sparse.csr_array, values: Array) -> Array:
+    """Return the product of a matrix with an array, (m,) or (m, k), on all cores: the same bits on any number."""
+    if matrix.nnz <= _LEAST:  # faster than to open a pool
+        return matrix @ values
+    with workers() as pool:
+        product = Rows(matrix, pool, lambda: None) @ (values[:, None] if values.ndim == 1 else values)
+    return product[:, 0] if values.ndim == 1 else product
 
 
 def matrix_by_rows(

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
+from ..algebra import multiply_rows
 from ..types import Array, Floats
 from .laplacian import LaplaceBeltrami
 
@@ -101,7 +102,7 @@ class Averages:
 def _repeated(averaging: sparse.csr_array, values: Floats, rounds: int) -> Floats:
     """Return quantities of points, (m, ...), after so many products with a matrix of means."""
     for _ in range(rounds):
-        values = averaging @ values
+        values = multiply_rows(averaging, values)
     return values
 
 
@@ -113,7 +114,7 @@ def off_neighbors(laplacian: LaplaceBeltrami, values: Floats, rounds: int) -> Fl
     weight = laplacian.stiffness.diagonal()
     weight = np.where(weight > 0.0, weight, 1.0)[:, None]
     for _ in range(rounds):
-        values = (laplacian.stiffness @ values) / weight
+        values = multiply_rows(laplacian.stiffness, values) / weight
     return values
 
 
@@ -130,9 +131,9 @@ def _matrices(laplacian: LaplaceBeltrami) -> tuple[sparse.csr_array, sparse.csr_
         weight += np.repeat(axis, count) * axis[stiffness.indices]
     weight *= np.maximum(-stiffness.data, 0.0)  # all but those on the diagonal
     each, every = np.ones(len(count)), np.repeat(1.0 / np.maximum(count, 1), count)
-    total = _like(stiffness, np.abs(weight)) @ each
+    total = multiply_rows(_like(stiffness, np.abs(weight)), each)
     weight /= np.repeat(np.where(total > 0.0, total, 1.0), count)
-    return _like(stiffness, weight), _like(stiffness, every), _like(stiffness, weight**2) @ each
+    return _like(stiffness, weight), _like(stiffness, every), multiply_rows(_like(stiffness, weight**2), each)
 
 
 def _like(matrix: sparse.csr_array, data: Array) -> sparse.csr_array:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from ..algebra import workers
+from ..algebra import multiply_rows, workers
 from ..arguments import check_points, check_switches, positive
 from ..errors import InvalidPointsError
 from ..frozen import Frozen
@@ -279,10 +279,10 @@ class LaplaceBeltrami(Frozen):
         areas, widths = self.areas, self.kernel_widths
         if checked.ndim == 2:
             areas, widths = areas[:, None], widths[:, None]
-        result: Floats = -(self.stiffness @ checked) / areas
+        result: Floats = -multiply_rows(self.stiffness, checked) / areas
         if raw:
             return result
-        return result + (SECOND_MOMENT / 8.0) * (self.stiffness @ (widths**2 * result)) / areas
+        return result + (SECOND_MOMENT / 8.0) * multiply_rows(self.stiffness, widths**2 * result) / areas
 
     @ends_at_one
     def eigenpairs(

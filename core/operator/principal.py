@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..algebra import workers
 from ..frozen import Frozen
 from ..geometry import frames
 from ..types import Floats
@@ -74,6 +75,7 @@ def mean_curvature(laplacian: LaplaceBeltrami) -> Floats:
     return measure_mean_curvature(laplacian).values
 
 
+@workers()
 def measure_mean_curvature(laplacian: LaplaceBeltrami) -> MeanCurvature:
     """Compute the mean curvature, and what noise has left in it.
 
@@ -172,6 +174,7 @@ class PrincipalCurvatures(Frozen):
         return np.hypot(self.first, self.second) / np.sqrt(2.0)
 
 
+@workers()
 def principal_curvatures(laplacian: LaplaceBeltrami) -> PrincipalCurvatures:
     """Compute the principal curvatures: their mean by the operator, their difference and direction by local quadrics.
 

@@ -14,7 +14,7 @@ import core
 from benchmarks.samplings import random_sphere
 from core.algebra import coarse_to_fine, davidson, hierarchy, solvers
 from core.algebra.hierarchy import approximate_inverse
-from core.algebra.rows import PART, Rows, matrix_by_rows
+from core.algebra.rows import PART, Rows, matrix_by_rows, multiply_rows
 from core.algebra.solvers import conjugate_gradients, solve_symmetric
 
 PAIRS = [(k, j) for k in range(2) for j in range(3)]
@@ -346,6 +346,18 @@ def test_a_product_is_changed_part_by_part_in_the_precision_of_its_columns(monke
     assert written is load
     np.testing.assert_allclose(found, exact, rtol=0.0, atol=tolerance)
     np.testing.assert_array_equal(written, found)
+
+
+@pytest.mark.parametrize("shape", [(40,), (40, 0), (40, 1), (40, 3), (40, 6)])
+def test_a_product_has_the_same_bits_on_any_number_of_cores(monkeypatch, shape):
+    rng = np.random.default_rng(0)
+    matrix, values = sparse.random_array((60, 40), density=0.2, rng=rng).tocsr(), rng.random(shape)
+    whole = multiply_rows(matrix, values)
+    np.testing.assert_allclose(whole, np.tensordot(matrix.toarray(), values, 1), rtol=0.0, atol=1e-14)
+    monkeypatch.setattr("core.algebra.rows.PART", 50)
+    monkeypatch.setattr("core.algebra.rows._LEAST", 50)
+    monkeypatch.setenv("MESHFREE_CORES", "3")
+    np.testing.assert_array_equal(multiply_rows(matrix, values), whole)
 
 
 @pytest.mark.parametrize("block", [1, 7, 100])
