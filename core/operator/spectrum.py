@@ -91,7 +91,8 @@ def solve_spectrum(
     matrix.data /= unit
     weyl = 4.0 * np.pi * count / areas.sum() / unit
     few = count <= _FEW * len(order)
-    check_mode_memory(n, count, few and needs_double(highest / unit, weyl))
+    if few and needs_double(highest / unit, weyl):
+        check_mode_memory(n, count, double=True)
     pairs = coarse_to_fine(matrix, 1.0 / root, count, tolerance, weyl, report) if few else None
     try:
         values, vectors = pairs or lift_lowest(matrix, count, _cut(areas, lengths, count) / unit, report)
